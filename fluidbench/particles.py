@@ -1,0 +1,145 @@
+"""The particle pool: one preallocated structure of arrays, shared by all worlds, reordered as a whole."""
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .errors import UserError
+from .scenario import Body, Scenario
+from .scene import Scene
+
+wp.set_module_options({"enable_backward": False})
+MAX_SLOTS = 2**26  # neighbour lists keep 26 bits for an index
+
+CORE = {
+    "position": wp.vec3,  # [m]
+    "velocity": wp.vec3,  # [m/s]
+    "mass": float,  # [kg]
+    "volume": float,  # rest volume, mass over rest density [m^3]
+    "phase": int,  # row of the scene's phase table
+    "held": int,  # 1 while its velocity is prescribed (inside a nozzle, clamped)
+    "birth_time": float,  # when it left the nozzle, 0 for a body [s]
+    "origin": int,  # number in the order of creation: the particle's identity
+}
+
+
+class OutOfCapacity(RuntimeError):
+    """The pool cannot hold what is to be added; the message says how much is needed."""
+
+
+class Pool:
+    """Slots world * capacity .. world * capacity + counts[world] - 1 are active.
+
+    `add_field` lets a solver keep its own state here, so that reordering carries it along. Fields of unused slots hold
+    their initial values: a particle needs no initialisation by the solver when it appears.
+    """
+
+    def __init__(self, scene: Scene, capacity: int) -> None:
+        if scene.worlds * capacity > MAX_SLOTS:
+            raise UserError(
+                f"{scene.worlds} world(s) of {capacity} particles exceed the {MAX_SLOTS} that can be addressed; "
+                "use a larger spacing"
+            )
+        self.scene, self.capacity, self.worlds = scene, max(1, capacity), scene.worlds
+        self.size = self.worlds * self.capacity
+        self.counts = [0] * self.worlds
+        self.stale = True  # set whenever particles appear or move otherwise than by a substep
+        self.fields: dict[str, wp.array] = {}
+        with wp.ScopedDevice(scene.device):
+            self.count = wp.zeros(self.worlds, dtype=int)
+            self.fault = wp.zeros(1, dtype=int)  # bits set by kernels; Solver.faults says what they mean
+        for name, dtype in CORE.items():
+            self.add_field(name, dtype)
+
+    def add_field(self, name: str, dtype: Any, initial: Any = None) -> wp.array:
+        """A per-particle array of this dtype, zero or `initial` everywhere."""
+        array = wp.zeros(self.size, dtype=dtype, device=self.scene.device)
+        if initial is not None:
+            array.fill_(initial)
+        self.fields[name] = array
+        return array
+
+    def __getattr__(self, name: str) -> wp.array:
+        try:
+            return self.__dict__["fields"][name]
+        except KeyError:
+            raise AttributeError(f"the pool has no field '{name}'") from None
+
+    def need(self, world: int, more: int) -> None:
+        """Raise OutOfCapacity unless `more` particles fit into a world."""
+        if self.counts[world] + more > self.capacity:
+            raise OutOfCapacity(
+                f"the pool holds {self.capacity} particles a world and {self.counts[world] + more} are needed"
+            )
+
+    def set_count(self, world: int, count: int) -> None:
+        self.counts[world] = count
+        self.count.assign(np.array(self.counts, np.int32))
+        self.stale = True
+
+    def place(self, position: np.ndarray, velocity: np.ndarray, volume: float) -> None:
+        """Add the same particles of equal rest volume to every world (positions (n, 3) [m], velocities [m/s])."""
+        n = len(position)
+        for world, scenario in enumerate(self.scene.scenarios):
+            self.need(world, n)
+            first = world * self.capacity + self.counts[world]
+            columns = {
+                "position": np.asarray(position, np.float32),
+                "velocity": np.asarray(velocity, np.float32),
+                "volume": np.full(n, volume, np.float32),
+                "mass": np.full(n, volume * scenario.material.density, np.float32),
+                "origin": np.arange(self.counts[world], self.counts[world] + n, dtype=np.int32),
+            }
+            for name, values in columns.items():
+                array = self.fields[name]
+                wp.copy(array, wp.array(values, dtype=array.dtype, device=self.scene.device), first, 0, n)
+            self.set_count(world, self.counts[world] + n)
+
+    def permute(self, order: wp.array) -> None:
+        """Move the particle in slot order[i] to slot i, all fields at once; order stays within each world."""
+        for array in self.fields.values():
+            scratch = wp.empty_like(array)
+            wp.launch(gather, self.size, [order, array, scratch], device=self.scene.device)
+            wp.copy(array, scratch)
+        self.stale = True
+
+    def snapshot(self, world: int = 0) -> dict[str, np.ndarray]:
+        """The core fields of a world's active particles as NumPy arrays, in order of creation."""
+        part = slice(world * self.capacity, world * self.capacity + self.counts[world])
+        columns = {name: self.fields[name].numpy()[part].copy() for name in CORE}
+        order = np.argsort(columns["origin"], kind="stable")
+        return {name: values[order] for name, values in columns.items()}
+
+    def footprint(self) -> dict[str, int]:
+        """Bytes of each field."""
+        return {name: array.capacity for name, array in self.fields.items()}
+
+
+@wp.kernel
+def gather(order: wp.array(dtype=int), source: wp.array(dtype=Any), target: wp.array(dtype=Any)):  # type: ignore[valid-type]
+    i = wp.tid()
+    target[i] = source[order[i]]
+
+
+def sample(body: Body, scenario: Scenario) -> tuple[np.ndarray, float]:
+    """(positions (n, 3) [m], volume of a particle [m^3]) of a body's part inside the domain.
+
+    A cubic lattice of the scenario's spacing, centred on the body; the particle volume makes the whole body's volume
+    exact.
+    """
+    cells = np.maximum(1, np.rint(2.0 * body.extent / scenario.spacing).astype(int))
+    axes = [(np.arange(n) + 0.5) * scenario.spacing - 0.5 * n * scenario.spacing for n in cells]
+    if body.kind == "box":
+        axes = [axis * (2.0 * half / (n * scenario.spacing)) for axis, half, n in zip(axes, body.extent, cells, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    if body.kind == "cylinder":
+        points = points[np.hypot(points[:, 0], points[:, 1]) <= body.extent[0]]
+    elif body.kind == "sphere":
+        points = points[np.linalg.norm(points, axis=1) <= body.extent[0]]
+    volume = body.volume / len(points)
+    points = points + np.asarray(body.center)
+    if scenario.jitter:
+        shift = np.random.default_rng(scenario.seed).uniform(-1, 1, points.shape)
+        points = points + scenario.jitter * scenario.spacing * shift
+    return points[scenario.domain.contains(points)], volume

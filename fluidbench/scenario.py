@@ -1,0 +1,296 @@
+"""What to simulate: the validated description of one scenario, in SI units with z up.
+
+A scenario says nothing of any method except in `numerics`, where each method's own section may override its defaults.
+It is read from TOML (`load`), or built in Python from the same classes.
+"""
+
+import math
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from .material import Material, NonNegative, Positive
+from .toolpath import Toolpath, Track
+
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+FACES = ("x_lower", "x_upper", "y_lower", "y_upper", "z_lower", "z_upper")
+
+
+class Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Friction(Model):
+    friction: NonNegative = Field(description="Coulomb friction coefficient; the only wall that lets material lift off")
+
+
+Wall = Literal["slip", "stick", "periodic"] | Friction
+
+
+class Walls(Model):
+    """One wall a face of the domain. `slip` is a mirror and so a symmetry plane too; `stick` is no-slip."""
+
+    x_lower: Wall = "slip"
+    x_upper: Wall = "slip"
+    y_lower: Wall = "slip"
+    y_upper: Wall = "slip"
+    z_lower: Wall = "stick"
+    z_upper: Wall = "slip"
+
+    @model_validator(mode="after")
+    def _periodic_in_pairs(self) -> "Walls":
+        for axis in "xyz":
+            pair = (getattr(self, f"{axis}_lower"), getattr(self, f"{axis}_upper"))
+            if pair.count("periodic") == 1:
+                raise ValueError(f"{axis}_lower and {axis}_upper must both be periodic, or neither")
+        return self
+
+    def faces(self) -> tuple[Wall, ...]:
+        return tuple(getattr(self, face) for face in FACES)
+
+    def periodic(self) -> tuple[bool, bool, bool]:
+        return (self.x_lower == "periodic", self.y_lower == "periodic", self.z_lower == "periodic")
+
+
+class Domain(Model):
+    """The box in which everything happens; its faces are the walls."""
+
+    lower: Vector = Field(description="lower corner [m]")
+    upper: Vector = Field(description="upper corner [m]")
+    walls: Walls = Walls()
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> "Domain":
+        for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
+            if not high > low:
+                raise ValueError(f"upper must exceed lower on the {axis} axis, got {low} and {high}")
+        return self
+
+    def contains(self, points, margin: float = 1e-9) -> np.ndarray:
+        points = np.asarray(points, dtype=float)
+        inside = (points >= np.array(self.lower) - margin) & (points <= np.array(self.upper) + margin)
+        return inside.all(axis=-1)
+
+
+class Nozzle(Model):
+    """A circular orifice that extrudes downwards; give `exit_speed` or `flow_rate`."""
+
+    diameter: Positive = Field(description="inner diameter D [m]")
+    exit_speed: Positive | None = Field(None, description="mean exit speed U [m/s]")
+    flow_rate: Positive | None = Field(None, description="volume flow rate Q = pi D^2 U / 4 [m^3/s]")
+    standoff: Positive = Field(description="gap between the exit and the surface printed on [m]")
+
+    @model_validator(mode="after")
+    def _one_rate(self) -> "Nozzle":
+        if (self.exit_speed is None) == (self.flow_rate is None):
+            raise ValueError("give exactly one of exit_speed and flow_rate")
+        return self
+
+    @property
+    def area(self) -> float:
+        return math.pi * self.diameter**2 / 4.0
+
+    @property
+    def speed(self) -> float:
+        """Mean exit speed U [m/s]."""
+        if self.exit_speed is not None:
+            return self.exit_speed
+        assert self.flow_rate is not None
+        return self.flow_rate / self.area
+
+    @property
+    def rate(self) -> float:
+        """Volume flow rate Q [m^3/s]."""
+        return self.area * self.speed
+
+
+class Body(Model):
+    """Material that is there at the start. Its velocity is velocity + gradient (x - center) + angular x (x - center).
+
+    What lies outside the domain is cut off: a quarter of a cylinder stands at a corner of two slip walls.
+    """
+
+    kind: Literal["box", "cylinder", "sphere"]
+    center: Vector = Field(description="centre of the body [m]")
+    size: Vector | None = Field(None, description="box: edge lengths [m]")
+    radius: Positive | None = Field(None, description="cylinder (axis z), sphere: radius [m]")
+    height: Positive | None = Field(None, description="cylinder: height [m]")
+    velocity: Vector = Field((0.0, 0.0, 0.0), description="velocity of the centre [m/s]")
+    velocity_gradient: Matrix | None = Field(None, description="dv_i/dx_j about the centre [1/s]")
+    angular_velocity: Vector = Field((0.0, 0.0, 0.0), description="rotation about the centre [rad/s]")
+
+    @model_validator(mode="after")
+    def _complete(self) -> "Body":
+        needs = {"box": ("size",), "cylinder": ("radius", "height"), "sphere": ("radius",)}[self.kind]
+        missing = [key for key in needs if getattr(self, key) is None]
+        if missing:
+            raise ValueError(f"a {self.kind} needs {' and '.join(missing)}")
+        if self.size is not None and min(self.size) <= 0:
+            raise ValueError(f"size must be positive, got {self.size}")
+        return self
+
+    @property
+    def extent(self) -> np.ndarray:
+        """Half edge lengths of the bounding box, shape (3,) [m]."""
+        if self.kind == "box":
+            return np.asarray(self.size) / 2.0
+        assert self.radius is not None
+        return np.array([self.radius, self.radius, self.radius if self.kind == "sphere" else (self.height or 0) / 2.0])
+
+    @property
+    def volume(self) -> float:
+        """Exact volume, before the domain cuts it [m^3]."""
+        a, b, c = 2.0 * self.extent
+        return {"box": a * b * c, "cylinder": math.pi / 4 * a * b * c, "sphere": math.pi / 6 * a * b * c}[self.kind]
+
+    def velocity_at(self, points: np.ndarray) -> np.ndarray:
+        """Initial velocity at points of shape (n, 3) [m/s]."""
+        arm = points - np.asarray(self.center)
+        velocity = np.asarray(self.velocity) + np.cross(self.angular_velocity, arm)
+        return velocity if self.velocity_gradient is None else velocity + arm @ np.asarray(self.velocity_gradient).T
+
+
+class Scenario(Model):
+    """One experiment, the same for every method."""
+
+    name: str = Field("unnamed", description="short name, used for folders")
+    title: str = Field("", description="one line for people")
+    domain: Domain
+    material: Material
+    gravity: Vector = Field((0.0, 0.0, -9.81), description="gravitational acceleration [m/s^2]")
+    body_force: Vector = Field((0.0, 0.0, 0.0), description="further force per unit mass [m/s^2]")
+    nozzle: Nozzle | None = None
+    toolpath: Toolpath | None = None
+    bodies: tuple[Body, ...] = ()
+    duration: Positive = Field(description="simulated time [s]")
+    output_interval: Positive | None = Field(None, description="time between outputs [s]; default duration / 20")
+    tick: Positive | None = Field(None, description="time between emission events and re-planned substeps [s]")
+    spacing: Positive = Field(description="particle spacing d [m]; a particle stands for d^3")
+    sound_speed_ratio: Positive = Field(10.0, description="artificial c of a liquid over its reference speed [-]")
+    jitter: Annotated[float, Field(ge=0, le=0.5)] = Field(0.0, description="random shift of bodies' particles / d [-]")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="the only source of randomness")
+    reference: Literal["martin_moyce_front", "viscoplastic_slump"] | None = Field(
+        None, description="a published answer to compare with (scenarios/reference)"
+    )
+    numerics: dict[str, dict[str, Any]] = Field({}, description="per method: overrides of its own numerical settings")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Scenario":
+        for check in (self._check_source, self._check_nozzle, self._check_bodies, self._check_periodic):
+            check()
+        return self
+
+    def _check_source(self) -> None:
+        if (self.nozzle is None) != (self.toolpath is None):
+            raise ValueError("nozzle and toolpath belong together: give both or neither")
+        if self.nozzle is None and not self.bodies:
+            raise ValueError("nothing to simulate: give bodies, or a nozzle with a toolpath")
+
+    def _check_nozzle(self) -> None:
+        if self.nozzle is None or self.track is None:
+            return
+        if self.spacing > self.nozzle.diameter / 2:
+            raise ValueError(
+                f"spacing = {self.spacing} is too coarse for nozzle.diameter = {self.nozzle.diameter}: "
+                "at least 2 particles must fit across it, 8 resolve a bead"
+            )
+        r = self.nozzle.diameter / 2
+        low, high = self.track.position.min(axis=0) - (r, r, 0), self.track.position.max(axis=0) + (r, r, 0)
+        for axis, a, b in zip("xyz", low, high, strict=True):
+            i = "xyz".index(axis)
+            if a < self.domain.lower[i] or b > self.domain.upper[i]:
+                what = "nozzle (standoff and layers)" if axis == "z" else "toolpath (with the nozzle's radius)"
+                raise ValueError(
+                    f"the {what} spans {axis} = {a:.6g} .. {b:.6g} m and leaves the domain, which spans "
+                    f"{self.domain.lower[i]:.6g} .. {self.domain.upper[i]:.6g} m"
+                )
+
+    def _check_bodies(self) -> None:
+        for i, body in enumerate(self.bodies):
+            low, high = np.asarray(body.center) - body.extent, np.asarray(body.center) + body.extent
+            if (high <= self.domain.lower).any() or (low >= self.domain.upper).any():
+                raise ValueError(f"bodies.{i} lies outside the domain")
+            if (2 * body.extent < self.spacing).any():
+                raise ValueError(f"bodies.{i} is thinner than one particle spacing ({self.spacing} m)")
+
+    def _check_periodic(self) -> None:
+        for axis, periodic in enumerate(self.domain.walls.periodic()):
+            length = self.domain.upper[axis] - self.domain.lower[axis]
+            if periodic and length < 6 * self.spacing:
+                raise ValueError(f"a periodic axis needs at least 6 spacings; {'xyz'[axis]} has {length / self.spacing:.3g}")
+
+    @cached_property
+    def track(self) -> Track | None:
+        """The toolpath in time."""
+        if self.nozzle is None or self.toolpath is None:
+            return None
+        return Track.of(self.toolpath, self.domain.lower[2], self.nozzle.standoff)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Gravity plus body force, shape (3,) [m/s^2]."""
+        return np.asarray(self.gravity) + np.asarray(self.body_force)
+
+    @cached_property
+    def reference_speed(self) -> float:
+        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, or sqrt(2 g H) of free fall."""
+        g = float(np.linalg.norm(self.acceleration))
+        speeds, height = [1e-3], 0.0
+        if self.nozzle is not None and self.toolpath is not None and self.track is not None:
+            speeds.append(math.hypot(self.nozzle.speed, self.toolpath.speed))
+            height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
+        for body in self.bodies:
+            corners = np.asarray(body.center) + np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * body.extent
+            speeds.append(float(np.linalg.norm(body.velocity_at(corners), axis=1).max()))
+            height = max(height, float(body.center[2] + body.extent[2]) - self.domain.lower[2])
+        return max(*speeds, math.sqrt(g * height))
+
+    @property
+    def liquid_sound_speed(self) -> float:
+        """Artificial sound speed of a liquid [m/s]: `sound_speed_ratio` times the reference speed (Monaghan 1994)."""
+        return self.sound_speed_ratio * self.reference_speed
+
+    @property
+    def wave_speed(self) -> float:
+        """Longitudinal wave speed of the material [m/s]."""
+        return self.material.wave_speed(self.liquid_sound_speed)
+
+    @cached_property
+    def schedule(self) -> tuple[float, int, int]:
+        """(tick [s], ticks in all, ticks between outputs).
+
+        A tick is the common clock of all methods: emission happens at its edges, so every method is fed the same
+        stream. By default matter moves at most a quarter of a spacing in it.
+        """
+        interval = min(self.output_interval or self.duration / 20.0, self.duration)
+        wanted = min(self.tick or 0.25 * self.spacing / self.reference_speed, interval)
+        per_output = max(1, math.ceil(interval / wanted - 1e-9))
+        tick = interval / per_output
+        return tick, max(1, round(self.duration / tick)), per_output
+
+    def warnings(self) -> list[str]:
+        """Values whose order of magnitude suggests a wrong unit."""
+        m, out = self.material, []
+        plausible = (
+            ("material.density", m.density, 10, 2e4, "kg/m^3"),
+            ("material.youngs_modulus", m.youngs_modulus, 10, 1e12, "Pa"),
+            ("material.viscosity", m.viscosity or None, 1e-6, 1e6, "Pa s"),
+            ("material.yield_stress", m.yield_stress or None, 1e-2, 1e8, "Pa"),
+            ("spacing", self.spacing, 1e-5, 0.2, "m"),
+            ("nozzle.diameter", self.nozzle and self.nozzle.diameter, 1e-4, 0.5, "m"),
+            ("nozzle speed", self.nozzle and self.nozzle.speed, 1e-5, 50, "m/s"),
+            ("toolpath.speed", self.toolpath and (self.toolpath.speed or None), 1e-5, 50, "m/s"),
+            ("gravity", float(np.linalg.norm(self.gravity)) or None, 0.1, 100, "m/s^2"),
+        )
+        for key, value, low, high, unit in plausible:
+            if value is not None and not low <= value <= high:
+                out.append(f"{key} = {value:g} {unit} is outside the usual {low:g} .. {high:g}; is it in {unit}?")
+        if self.wave_speed < 3 * self.reference_speed:
+            out.append(
+                f"the material's wave speed ({self.wave_speed:.3g} m/s) is below 3 times the scenario's speed "
+                f"({self.reference_speed:.3g} m/s): expect visible compression"
+            )
+        return out

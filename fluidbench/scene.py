@@ -1,0 +1,128 @@
+"""A scenario laid out on a device: phase table, walls, gravity and dt, for one world or several.
+
+Worlds are copies of one scenario that differ in material, gravity or body force and advance in the same launches.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+
+from .errors import UserError
+from .material import Material
+from .scenario import Friction, Scenario
+
+SLIP, STICK, PERIODIC, FRICTION = 0, 1, 2, 3
+NEVER_YIELDS = 1.0e30
+
+
+@wp.struct
+class Phase:
+    """Parameters of the material law; see solvers/constitutive.py for their meaning. SI units."""
+
+    density: float
+    bulk_modulus: float
+    shear_modulus: float
+    viscosity: float
+    yield_stress: float
+    plastic_viscosity: float
+    flow_index: float
+    tait: float
+    tension_limit: float
+
+
+@wp.struct
+class Box:
+    """The domain's walls: kind and friction coefficient of the lower and upper face of each axis."""
+
+    lower: wp.vec3
+    upper: wp.vec3
+    lower_kind: wp.vec3i
+    upper_kind: wp.vec3i
+    lower_friction: wp.vec3
+    upper_friction: wp.vec3
+
+
+class Scene:
+    """What a solver sees of the scenarios. `dt`, `gravity` and `phases` are device arrays, so that a captured graph
+    survives a change of their values."""
+
+    def __init__(self, scenarios: Scenario | Sequence[Scenario], device: str = "cpu") -> None:
+        self.scenarios = [scenarios] if isinstance(scenarios, Scenario) else list(scenarios)
+        self.scenario = self.scenarios[0]
+        self.device = wp.get_device(device)
+        self.worlds = len(self.scenarios)
+        self._check_worlds()
+        self.spacing = self.scenario.spacing
+        self.periodic = self.scenario.domain.walls.periodic()
+        self.sound_speed = max(s.liquid_sound_speed for s in self.scenarios)
+        self.wave_speed = max(s.material.wave_speed(self.sound_speed) for s in self.scenarios)
+        self.box = box_of(self.scenario)
+        self._dt = math.nan
+        with wp.ScopedDevice(self.device):
+            self.dt = wp.zeros(self.worlds, dtype=float)
+            self.gravity = wp.array(np.array([s.acceleration for s in self.scenarios], np.float32), dtype=wp.vec3)
+            phases = wp.array([self._phase(s.material) for s in self.scenarios], dtype=Phase)
+            self.phases = phases.reshape((self.worlds, 1))
+
+    def _check_worlds(self) -> None:
+        vary = {"material", "gravity", "body_force", "name", "title", "seed"}
+        first = self.scenario.model_dump(exclude=vary)
+        for i, other in enumerate(self.scenarios[1:], 1):
+            changed = [key for key, value in other.model_dump(exclude=vary).items() if value != first[key]]
+            if changed:
+                raise UserError(
+                    f"worlds may differ in material, gravity, body_force and seed only; world {i} differs in "
+                    f"{', '.join(changed)}"
+                )
+
+    def _phase(self, material: Material) -> Phase:
+        phase = Phase()
+        phase.density = material.density
+        phase.bulk_modulus = material.bulk(self.sound_speed)
+        phase.shear_modulus = material.shear_modulus
+        phase.viscosity = material.viscosity
+        phase.yield_stress = min(material.flow_threshold, NEVER_YIELDS)
+        phase.plastic_viscosity = material.flow_consistency
+        phase.flow_index = material.flow_index
+        phase.tait = 1.0 if material.equation_of_state == "tait" else 0.0
+        # A liquid cavitates rather than carry tension; what has shear stiffness holds together.
+        phase.tension_limit = 0.0 if material.youngs_modulus is None else NEVER_YIELDS
+        return phase
+
+    @property
+    def elastic(self) -> bool:
+        """Whether any world has shear stiffness."""
+        return any(s.material.youngs_modulus is not None for s in self.scenarios)
+
+    @property
+    def viscous(self) -> bool:
+        """Whether any world has Newtonian viscosity."""
+        return any(s.material.viscosity > 0 for s in self.scenarios)
+
+    @property
+    def lanes(self) -> int:
+        """Threads of a kernel that strides over all its work: one on the CPU, a full device on CUDA."""
+        return 1 if self.device.is_cpu else 256 * 1024
+
+    def set_dt(self, dt: float) -> None:
+        if not math.isfinite(dt) or dt <= 0:
+            raise ValueError(f"dt must be positive, got {dt}")
+        if dt != self._dt:
+            self.dt.fill_(dt)
+            self._dt = dt
+
+
+def box_of(scenario: Scenario) -> Box:
+    """The domain's walls as a device structure."""
+    kinds, friction = [], []
+    for wall in scenario.domain.walls.faces():
+        named = {"slip": SLIP, "stick": STICK, "periodic": PERIODIC}
+        kinds.append(FRICTION if isinstance(wall, Friction) else named[wall])
+        friction.append(wall.friction if isinstance(wall, Friction) else 0.0)
+    box = Box()
+    box.lower, box.upper = wp.vec3(*scenario.domain.lower), wp.vec3(*scenario.domain.upper)
+    box.lower_kind, box.upper_kind = wp.vec3i(*kinds[0::2]), wp.vec3i(*kinds[1::2])
+    box.lower_friction, box.upper_friction = wp.vec3(*friction[0::2]), wp.vec3(*friction[1::2])
+    return box

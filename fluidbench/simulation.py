@@ -1,0 +1,207 @@
+"""The one loop: emit, plan substeps, advance, look. Solver, time step, emission and measurement meet only here."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from . import health
+from .errors import UserError
+from .health import Health, Vital
+from .particles import OutOfCapacity, Pool, sample
+from .process import emission
+from .process.emission import Emission, Stream
+from .scenario import Scenario
+from .scene import Scene
+from .solver import Solver, configure, get_solver
+from .timestep import Bound, Plan, plan
+
+SORT_TICKS = 32  # ticks between reorderings of the pool, at most
+SPEED_MARGIN = 1.25  # the speed seen at the last look may grow by this much until the next
+PACE_SECONDS = 8.0  # wall time after which the pace is judged against the wall limit
+
+
+class Verdict(StrEnum):
+    """How a run ended. Only `completed` carries results to be compared."""
+
+    COMPLETED = "completed"
+    DIVERGED = "diverged"
+    OUT_OF_CAPACITY = "out_of_capacity"
+    TIMEOUT = "timeout"
+    ERROR = "error"
+    REFUSED = "refused"
+
+
+@dataclass
+class Outcome:
+    """How far a run came, what it cost and which bound held it back."""
+
+    verdict: Verdict
+    reason: str = ""
+    time: float = 0.0
+    ticks: int = 0
+    substeps: int = 0
+    particle_substeps: int = 0
+    wall: float = 0.0
+    cpu: float = 0.0
+    prepare_wall: float = 0.0
+    binding: dict[str, float] = field(default_factory=dict)
+    peak_particles: int = 0
+
+
+def capacity_of(scenario: Scenario) -> int:
+    """Particles that a scenario will ever hold."""
+    bodies = sum(len(sample(body, scenario)[0]) for body in scenario.bodies)
+    return bodies + (Stream(scenario).particles if scenario.nozzle is not None else 0)
+
+
+class Simulation:
+    """One method on one scenario, or on several worlds of it."""
+
+    def __init__(
+        self, scenarios: Scenario | Sequence[Scenario], method: str | type[Solver], device: str = "cpu",
+        backend: str = "warp", config: Any = None, graphs: bool = True,
+    ) -> None:  # fmt: skip
+        solver_class = get_solver(method) if isinstance(method, str) else method
+        self.scene = Scene(scenarios, device)
+        self.scenario = self.scene.scenario
+        self.config = configure(solver_class, self.scenario) if config is None else config
+        for scenario in self.scene.scenarios:
+            if reason := solver_class.refuses(scenario, self.config):
+                raise UserError(f"{solver_class.name} cannot run {scenario.name}: {reason}")
+        self.pool = Pool(self.scene, capacity_of(self.scenario))
+        for body in self.scenario.bodies:
+            points, volume = sample(body, self.scenario)
+            self.pool.place(points, body.velocity_at(points), volume)
+        self.emission = Emission(self.scene, self.pool) if self.scenario.nozzle is not None else None
+        self.solver = solver_class(self.scene, self.pool, self.config, backend)
+        self.health = Health(self.scene, self.pool)
+        self.tick, self.ticks, self.ticks_per_output = self.scenario.schedule
+        self.speed = self.scenario.reference_speed
+        self.done = 0
+        self._identity = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
+        self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
+        self._graphs: dict[int, Any] = {}
+        self._use_graphs = graphs
+
+    @property
+    def now(self) -> float:
+        """Simulated time [s]."""
+        return self.done * self.tick
+
+    def bounds(self) -> list[Bound]:
+        """The bounds that hold now, over all worlds, for the speed last seen."""
+        return [b for s in self.scene.scenarios for b in self.solver.bounds(s, self.config, SPEED_MARGIN * self.speed)]
+
+    def prepare(self) -> None:
+        """Compile and load every kernel."""
+        self.solver.prepare()
+        wp.load_module(health, device=self.scene.device)
+        if self.emission is not None:
+            wp.load_module(emission, device=self.scene.device)
+
+    def advance(self) -> Plan:
+        """One tick: feed, plan, and run its substeps."""
+        if self.emission is not None:
+            self.emission.advance(self.now, self.tick)
+        if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
+            self._reorder(keys)
+        if self.pool.stale:
+            self.solver.refresh()
+            self.pool.stale = False
+        steps = plan(self.bounds(), self.tick)
+        self.scene.set_dt(steps.dt)
+        self._run(steps.substeps)
+        self.done += 1
+        return steps
+
+    def look(self) -> Vital:
+        """Read the vital signs; synchronises with the device."""
+        vital = self.health.read()
+        self.speed = max(vital.speed, 0.1 * self.scenario.reference_speed)
+        return vital
+
+    def _reorder(self, keys: wp.array) -> None:
+        self._order.assign(self._identity)
+        wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
+        self.pool.permute(self._order)
+
+    def _run(self, substeps: int) -> None:
+        """Replay `substeps` substeps: one graph a substep on the CPU, where replay is free, one for all on CUDA."""
+        if not self._use_graphs:
+            for _ in range(substeps):
+                self.solver.substep()
+            return
+        each = 1 if self.scene.device.is_cpu else substeps
+        if each not in self._graphs:
+            with wp.ScopedCapture(device=self.scene.device) as capture:
+                for _ in range(each):
+                    self.solver.substep()
+            self._graphs[each] = capture.graph
+        for _ in range(substeps // each):
+            wp.capture_launch(self._graphs[each])
+
+    def fault(self) -> str | None:
+        """What a kernel could not do, in the solver's words."""
+        bits = int(self.pool.fault.numpy()[0])
+        words = [text for bit, text in self.solver.faults.items() if bits & bit]
+        return "; ".join(words) if words else None
+
+    def run(self, observe: Callable[["Simulation", Vital], None] | None = None, wall_limit: float | None = None) -> Outcome:
+        """Run to the end, or until something breaks; `observe` is called at every output, off the clock."""
+        outcome = Outcome(Verdict.COMPLETED)
+        start = time.perf_counter()
+        self.prepare()
+        outcome.prepare_wall = time.perf_counter() - start
+        every = 1 if self.scene.device.is_cpu else min(8, self.ticks_per_output)
+        if observe is not None:
+            if self.emission is not None:
+                self.emission.advance(0.0, self.tick)
+            observe(self, self.look())
+        while self.done < self.ticks and outcome.verdict is Verdict.COMPLETED:
+            self._tick(outcome, every, observe, wall_limit)
+        outcome.time = self.now
+        outcome.ticks = self.done
+        return outcome
+
+    def _tick(self, outcome: Outcome, every: int, observe, wall_limit: float | None) -> None:
+        wall, cpu = time.perf_counter(), time.process_time()
+        at_output = False
+        try:
+            steps = self.advance()
+            at_output = self.done % self.ticks_per_output == 0 or self.done == self.ticks
+            vital = self.look() if self.done % every == 0 or at_output else None
+        except OutOfCapacity as error:
+            outcome.verdict, outcome.reason = Verdict.OUT_OF_CAPACITY, str(error)
+            return
+        outcome.wall += time.perf_counter() - wall
+        outcome.cpu += time.process_time() - cpu
+        active = sum(self.pool.counts)
+        outcome.substeps += steps.substeps
+        outcome.particle_substeps += steps.substeps * active
+        outcome.peak_particles = max(outcome.peak_particles, active)
+        outcome.binding[steps.binding.name] = outcome.binding.get(steps.binding.name, 0.0) + self.tick
+        if vital is None:
+            return
+        if vital.complaint:
+            outcome.verdict, outcome.reason = Verdict.DIVERGED, f"at t = {self.now:.4g} s {vital.complaint}"
+        elif fault := self.fault():
+            outcome.verdict, outcome.reason = Verdict.OUT_OF_CAPACITY, f"at t = {self.now:.4g} s {fault}"
+        elif wall_limit is not None and (late := self._too_slow(outcome, wall_limit)):
+            outcome.verdict, outcome.reason = Verdict.TIMEOUT, late
+        elif observe is not None and at_output:
+            observe(self, vital)
+
+    def _too_slow(self, outcome: Outcome, limit: float) -> str | None:
+        """Over the wall limit, or certain to be: the pace only falls as particles are added."""
+        expected = outcome.wall * self.ticks / self.done
+        if outcome.wall > limit or (outcome.wall > min(PACE_SECONDS, limit) and expected > 2.0 * limit):
+            return (
+                f"stopped at t = {self.now:.4g} s after {outcome.wall:.0f} s: at this pace the run takes at least "
+                f"{expected:.0f} s, the limit is {limit:.0f} s"
+            )
+        return None

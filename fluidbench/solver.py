@@ -1,0 +1,125 @@
+"""The contract that every method implements, and how methods are found.
+
+A solver advances a pool of particles by one substep. It knows nothing of nozzles, schedules, files or measures.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from enum import Enum
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import UserError, suggestion
+
+if TYPE_CHECKING:
+    from .particles import Pool
+    from .scenario import Scenario
+    from .scene import Scene
+    from .timestep import Bound
+
+ENTRY_POINTS = "fluidbench.solvers"
+
+
+class Feature(Enum):
+    """What a method can honour; a scenario that needs more is refused or approximated, and the record says so."""
+
+    PRESSURE = "pressure from an equation of state"
+    VISCOSITY = "Newtonian viscosity"
+    ELASTICITY = "elastic shear stress"
+    YIELD = "yield stress"
+    FRICTION = "Coulomb friction at walls"
+    PERIODIC = "periodic axes"
+
+
+class Config(BaseModel):
+    """A method's own numerical settings; frozen, unknown keys refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Solver(ABC):
+    """One numerical method. Subclass it, give it the class attributes below, and register the class as an entry point
+    of the group `fluidbench.solvers`."""
+
+    name: ClassVar[str]
+    paradigm: ClassVar[str]
+    features: ClassVar[frozenset[Feature]]
+    Config: ClassVar[type[Config]]
+    passes: ClassVar[tuple[str, ...]]
+    faults: ClassVar[dict[int, str]] = {}
+
+    @classmethod
+    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
+        """Why it cannot run this scenario, in words a user understands; None when it can."""
+        return None
+
+    @classmethod
+    def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
+        """Which parts of the scenario it only approximates, one sentence each; recorded with every run."""
+        return []
+
+    @classmethod
+    @abstractmethod
+    def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
+        """Every limit on dt for matter moving at up to `speed` [m/s], by name, formula and source."""
+
+    @abstractmethod
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
+        """Allocate everything the method needs: nothing is allocated later."""
+
+    @abstractmethod
+    def substep(self) -> None:
+        """Enqueue the passes that advance every particle by `scene.dt`.
+
+        No host synchronisation, no allocation and no branch on device data: the whole call is captured as a graph.
+        """
+
+    def prepare(self) -> None:  # noqa: B027
+        """Compile the kernels; timed apart from the run."""
+
+    def refresh(self) -> None:  # noqa: B027
+        """Called between substeps, outside any graph, after particles appeared, moved in memory or were moved."""
+
+    def sort_keys(self) -> Any | None:
+        """int64 keys that put neighbours side by side, in the first half of an array of twice the pool's size; None
+        to keep the order."""
+        return None
+
+    @abstractmethod
+    def densities(self) -> Any:
+        """Present density of every particle slot, shape (worlds * capacity,) [kg/m^3], as a NumPy array."""
+
+    @abstractmethod
+    def footprint(self) -> dict[str, int]:
+        """Bytes allocated by the method itself, by part."""
+
+
+def solver_names() -> list[str]:
+    """Names of all registered methods; the shipped ones first, in the order of the paper's table."""
+    order = {"mpm": 0, "sph": 1, "pbd": 2}
+    return sorted({point.name for point in entry_points(group=ENTRY_POINTS)}, key=lambda n: (order.get(n, 9), n))
+
+
+def get_solver(name: str) -> type[Solver]:
+    """The method registered under this name; raises UserError with the nearest known name."""
+    for point in entry_points(group=ENTRY_POINTS, name=name):
+        return point.load()
+    raise UserError(f"no solver named '{name}'{suggestion(name, solver_names())}")
+
+
+def configure(solver: type[Solver], scenario: Scenario) -> Any:
+    """The method's Config with the scenario's `numerics` section applied; raises UserError for unknown keys."""
+    given = scenario.numerics.get(solver.name, {})
+    try:
+        return solver.Config(**given)
+    except ValidationError as error:
+        item = error.errors()[0]
+        key = ".".join(str(part) for part in item["loc"])
+        if item["type"] == "extra_forbidden":
+            raise UserError(
+                f"numerics.{solver.name}: unknown key '{key}'{suggestion(key, solver.Config.model_fields)}"
+            ) from None
+        raise UserError(f"numerics.{solver.name}.{key}: {item['msg']} (got {item['input']!r})") from None

@@ -1,0 +1,1 @@
+"""What to simulate: shipped scenarios (extrusion/*.toml) and published answers (reference/*.csv)."""

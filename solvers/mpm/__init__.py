@@ -1,0 +1,5 @@
+"""MLS-MPM with APIC transfers."""
+
+from .solver import SolverMPM
+
+__all__ = ["SolverMPM"]

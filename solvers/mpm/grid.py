@@ -1,0 +1,125 @@
+"""The background grid of MPM: blocks of 4 x 4 x 4 nodes, allocated where there is material.
+
+Node 4 of a walled axis lies on the lower wall, node 4 + cells on the upper one; a periodic axis has the nodes
+4 .. 4 + cells - 1. `table` holds slot + 1 of each block of each world, 0 where there is none.
+"""
+
+import numpy as np
+import warp as wp
+
+from fluidbench.errors import UserError
+from fluidbench.scene import PERIODIC, Scene
+
+FIRST = 4  # node index of the lower walls: one block of ghost nodes lies behind them
+FAULT_BLOCKS = 1
+MAX_BLOCKS = 2**30
+
+
+@wp.struct
+class Grid:
+    origin: wp.vec3  # position of node 0 [m]
+    dx: float  # node spacing [m]
+    inv_dx: float  # [1/m]
+    cells: wp.vec3i
+    wrap: wp.vec3i  # cells along periodic axes, else 0
+    blocks: wp.vec3i
+    blocks_per_world: int
+    lower_kind: wp.vec3i
+    upper_kind: wp.vec3i
+    lower_friction: wp.vec3
+    upper_friction: wp.vec3
+    lower: wp.vec3  # walls as the grid has them [m]
+    upper: wp.vec3
+
+
+def grid_of(scene: Scene, dx: float) -> Grid:
+    """The grid of a scene; walls lie on node planes, so lengths are rounded to whole cells (periodic ones must fit)."""
+    domain, grid = scene.scenario.domain, Grid()
+    length = np.asarray(domain.upper) - np.asarray(domain.lower)
+    cells = np.maximum(1, np.rint(length / dx)).astype(int)
+    blocks = (cells + 2 * FIRST) // 4 + 1
+    if int(np.prod(blocks)) * scene.worlds > MAX_BLOCKS:
+        raise UserError(f"the domain holds {np.prod(blocks):.3g} grid blocks; use a smaller domain or a larger spacing")
+    grid.origin = wp.vec3(*(np.asarray(domain.lower) - FIRST * dx))
+    grid.dx, grid.inv_dx = dx, 1.0 / dx
+    grid.cells, grid.blocks = wp.vec3i(*cells.tolist()), wp.vec3i(*blocks.tolist())
+    grid.wrap = wp.vec3i(*[int(n) if periodic else 0 for n, periodic in zip(cells, scene.periodic, strict=True)])
+    grid.blocks_per_world = int(np.prod(blocks))
+    for name in ("lower_kind", "upper_kind", "lower_friction", "upper_friction"):
+        setattr(grid, name, getattr(scene.box, name))
+    grid.lower, grid.upper = wp.vec3(*domain.lower), wp.vec3(*(np.asarray(domain.lower) + cells * dx))
+    return grid
+
+
+@wp.func
+def wrapped(node: int, wrap: int):
+    """Index of a node on a periodic axis of `wrap` cells; unchanged on a walled one (wrap = 0)."""
+    inside = node
+    if wrap > 0:
+        if node < FIRST:
+            inside = node + wrap
+        elif node >= FIRST + wrap:
+            inside = node - wrap
+    return inside
+
+
+@wp.func
+def first_node(grid: Grid, x: wp.vec3):
+    """The lowest of the 27 nodes around a point (before wrapping)."""
+    y = (x - grid.origin) * grid.inv_dx
+    return wp.vec3i(int(wp.floor(y[0] - 0.5)), int(wp.floor(y[1] - 0.5)), int(wp.floor(y[2] - 0.5)))
+
+
+@wp.func
+def activate_block(
+    grid: Grid, world: int, i: int, j: int, k: int, table: wp.array(dtype=int), block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int), fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Give the block of node (i, j, k) a slot unless it has one."""
+    b = (((i >> 2) * grid.blocks[1] + (j >> 2)) * grid.blocks[2] + (k >> 2)) + world * grid.blocks_per_world
+    if table[b] == 0:
+        if wp.atomic_cas(table, b, 0, -1) == 0:
+            slot = wp.atomic_add(active, 0, 1)
+            if slot < block_of.shape[0]:
+                block_of[slot] = b
+                table[b] = slot + 1
+            else:
+                table[b] = 0
+                wp.atomic_or(fault, 0, FAULT_BLOCKS)
+
+
+@wp.func
+def activate_stencil(
+    grid: Grid, world: int, base: wp.vec3i, table: wp.array(dtype=int), block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int), fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Activate the blocks of the 27 nodes that start at `base`: those of its eight corners."""
+    for corner in range(8):
+        i = wrapped(base[0] + 2 * (corner >> 2), grid.wrap[0])
+        j = wrapped(base[1] + 2 * ((corner >> 1) & 1), grid.wrap[1])
+        k = wrapped(base[2] + 2 * (corner & 1), grid.wrap[2])
+        activate_block(grid, world, i, j, k, table, block_of, active, fault)
+
+
+@wp.func
+def node_of(grid: Grid, block: int, local: int):
+    """Node (i, j, k) from its block's number within the world and its place within the block."""
+    bz = block % grid.blocks[2]
+    by = (block / grid.blocks[2]) % grid.blocks[1]
+    bx = block / (grid.blocks[1] * grid.blocks[2])
+    return wp.vec3i(bx * 4 + (local >> 4), by * 4 + ((local >> 2) & 3), bz * 4 + (local & 3))
+
+
+@wp.func
+def raw_node(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)):
+    """Momentum and mass scattered to a node; zero where no block is active."""
+    b = ((node[0] >> 2) * grid.blocks[1] + (node[1] >> 2)) * grid.blocks[2] + (node[2] >> 2)
+    slot = table[b + world * grid.blocks_per_world] - 1
+    value = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    if slot >= 0:
+        value = raw[slot * 64 + ((node[0] & 3) << 4) + ((node[1] & 3) << 2) + (node[2] & 3)]
+    return value
+
+
+def is_walled(kind: int) -> bool:
+    return kind != PERIODIC

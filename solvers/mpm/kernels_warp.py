@@ -1,0 +1,368 @@
+"""MLS-MPM (Hu et al. 2018, ACM TOG 37:150) with APIC transfers (Jiang et al. 2015, ACM TOG 34:51), in Warp.
+
+One substep: clear_grid, p2g (strain, stress, scatter), grid (momentum balance and walls), g2p (gather, move).
+Quadratic B-splines; D = dx^2 / 4, so the inverse inertia tensor is 4 / dx^2.
+"""
+
+import warp as wp
+
+from fluidbench.scene import FRICTION, PERIODIC, STICK, Phase
+
+from .. import constitutive
+from ..bind import warp_func
+from ..scatter import add_vec4
+from ..smoothing import quadratic_spline
+from .grid import FIRST, Grid, activate_stencil, first_node, node_of, raw_node, wrapped
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+pressure = warp_func(constitutive.pressure)
+strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
+spline = warp_func(quadratic_spline)
+FAULT_STENCIL = 2
+
+
+@wp.kernel
+def reset_blocks(table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), lanes: int):
+    """Forget all blocks."""
+    t = wp.tid()
+    while t < wp.min(active[0], block_of.shape[0]):
+        table[block_of[t]] = 0
+        t += lanes
+
+
+@wp.kernel
+def find_blocks(
+    grid: Grid, capacity: int, count: wp.array(dtype=int), position: wp.array(dtype=wp.vec3),
+    # outputs
+    table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Activate the blocks around every particle."""
+    p = wp.tid()
+    world = p / capacity
+    if p - world * capacity < count[world]:
+        activate_stencil(grid, world, first_node(grid, position[p]), table, block_of, active, fault)
+
+
+@wp.kernel
+def clear_grid(active: wp.array(dtype=int), lanes: int, raw: wp.array(dtype=wp.vec4)):
+    t = wp.tid()
+    n = wp.min(active[0] * 64, raw.shape[0])
+    while t < n:
+        raw[t] = wp.vec4(0.0, 0.0, 0.0, 0.0)
+        t += lanes
+
+
+@wp.func
+def node_parts(grid: Grid, base: wp.vec3i):
+    """Per axis the block and in-block contributions to the address of the three stencil nodes."""
+    bx, by, bz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
+    lx, ly, lz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
+    for o in range(3):
+        i = wrapped(base[0] + o, grid.wrap[0])
+        j = wrapped(base[1] + o, grid.wrap[1])
+        k = wrapped(base[2] + o, grid.wrap[2])
+        bx[o] = (i >> 2) * grid.blocks[1] * grid.blocks[2]
+        by[o] = (j >> 2) * grid.blocks[2]
+        bz[o] = k >> 2
+        lx[o] = (i & 3) << 4
+        ly[o] = (j & 3) << 2
+        lz[o] = k & 3
+    return bx, by, bz, lx, ly, lz
+
+
+@wp.func
+def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocity_gradient: wp.mat33):
+    """Kirchhoff stress [Pa] from J, the elastic tensor (b: diagonal, s: xy, xz, yz) and the velocity gradient."""
+    p = volume_ratio * pressure(1.0 / volume_ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+    g = phase.shear_modulus
+    m = g * (b[0] + b[1] + b[2]) / 3.0 + p
+    tau = wp.mat33(
+        g * b[0] - m, g * s[0], g * s[1],
+        g * s[0], g * b[1] - m, g * s[2],
+        g * s[1], g * s[2], g * b[2] - m,
+    )  # fmt: skip
+    if phase.viscosity > 0.0:
+        rate = 0.5 * (velocity_gradient + wp.transpose(velocity_gradient))
+        mean = wp.trace(rate) / 3.0
+        tau += (2.0 * volume_ratio * phase.viscosity) * (rate - wp.diag(wp.vec3(mean, mean, mean)))
+    return tau
+
+
+@wp.kernel
+def p2g(
+    grid: Grid, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), phases: wp.array2d(dtype=Phase),
+    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), affine: wp.array(dtype=wp.mat33),
+    mass: wp.array(dtype=float), volume: wp.array(dtype=float), phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int), table: wp.array(dtype=int),
+    # outputs
+    volume_ratio: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3), raw: wp.array(dtype=wp.vec4), fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18)."""
+    p = wp.tid()
+    world = p / capacity
+    if p - world * capacity < count[world]:
+        h = dt[world]
+        phase = phases[world, phase_of[p]]
+        c = affine[p]
+        j = volume_ratio[p]
+        b = elastic_normal[p]
+        s = elastic_shear[p]
+        m = mass[p]
+        a = m * c
+        if held[p] == 0:
+            j *= wp.max(1.0 + h * wp.trace(c), 0.1)
+            volume_ratio[p] = j
+            if phase.shear_modulus > 0.0:
+                b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
+                    c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2],
+                    b[0], b[1], b[2], s[0], s[1], s[2],
+                    phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, h,
+                )  # fmt: skip
+                b = wp.vec3(b_xx, b_yy, b_zz)
+                s = wp.vec3(b_xy, b_xz, b_yz)
+                elastic_normal[p] = b
+                elastic_shear[p] = s
+            a -= (4.0 * h * grid.inv_dx * grid.inv_dx * volume[p]) * kirchhoff(phase, j, b, s, c)
+        base = first_node(grid, position[p])
+        f = (position[p] - grid.origin) * grid.inv_dx - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
+        wx0, wx1, wx2 = spline(f[0])
+        wy0, wy1, wy2 = spline(f[1])
+        wz0, wz1, wz2 = spline(f[2])
+        wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+        bx, by, bz, lx, ly, lz = node_parts(grid, base)
+        a *= grid.dx
+        momentum = m * velocity[p] - a * f
+        start = world * grid.blocks_per_world
+        for o in range(3):
+            mx = momentum + float(o) * wp.vec3(a[0, 0], a[1, 0], a[2, 0])
+            for q in range(3):
+                my = mx + float(q) * wp.vec3(a[0, 1], a[1, 1], a[2, 1])
+                wxy = wx[o] * wy[q]
+                for r in range(3):
+                    mv = my + float(r) * wp.vec3(a[0, 2], a[1, 2], a[2, 2])
+                    slot = table[start + bx[o] + by[q] + bz[r]] - 1
+                    w = wxy * wz[r]
+                    if slot >= 0:
+                        add_vec4(raw, slot * 64 + lx[o] + ly[q] + lz[r], wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m))
+                    else:
+                        fault[0] = FAULT_STENCIL
+
+
+@wp.func
+def mirror(node: int, cells: int, lower_kind: int, upper_kind: int):
+    """The node in front of a mirroring wall (slip, stick) whose image this node is; itself elsewhere."""
+    inside = node
+    if node < FIRST and lower_kind != FRICTION and lower_kind != PERIODIC:
+        inside = 2 * FIRST - node
+    if node > FIRST + cells and upper_kind != FRICTION and upper_kind != PERIODIC:
+        inside = 2 * (FIRST + cells) - node
+    return inside
+
+
+@wp.func
+def image(node: int, cells: int, lower_kind: int, upper_kind: int):
+    """The ghost node whose content a mirroring wall folds onto this one; the node itself where there is none."""
+    behind = node
+    if node == FIRST + 1 and lower_kind != FRICTION and lower_kind != PERIODIC:
+        behind = FIRST - 1
+    if node == FIRST + cells - 1 and upper_kind != FRICTION and upper_kind != PERIODIC:
+        behind = FIRST + cells + 1
+    return behind
+
+
+@wp.func
+def flipped(v: wp.vec4, axis: int, kind: int):
+    """A momentum or velocity seen in a wall: slip mirrors the normal component, stick turns all of them round."""
+    out = v
+    if kind == STICK:
+        out = wp.vec4(-v[0], -v[1], -v[2], v[3])
+    else:
+        out[axis] = -v[axis]
+    return out
+
+
+@wp.func
+def wall_kind(node: int, lower_kind: int, upper_kind: int, cells: int):
+    """Kind of the wall nearest to a node."""
+    kind = upper_kind
+    if 2 * (node - FIRST) < cells:
+        kind = lower_kind
+    return kind
+
+
+@wp.func
+def rub(v: wp.vec3, axis: int, outward: float, friction: float):
+    """Unilateral contact with Coulomb friction: no motion into the wall, tangential loss up to friction times that."""
+    out = v
+    into = outward * v[axis]
+    if into > 0.0:
+        out[axis] = 0.0
+        slide = wp.length(out)
+        out = out * (1.0 - wp.min(friction * into / wp.max(slide, 1.0e-12), 1.0))
+    return out
+
+
+@wp.func
+def wall_velocity(grid: Grid, node: wp.vec3i, v: wp.vec3):
+    """Impose the walls on the velocity of a node on, or behind, them."""
+    out = v
+    for axis in range(3):
+        i, last = node[axis], FIRST + grid.cells[axis]
+        lower, upper = grid.lower_kind[axis], grid.upper_kind[axis]
+        if lower != PERIODIC and (i <= FIRST or i >= last):
+            kind = lower
+            friction = grid.lower_friction[axis]
+            outward = float(-1.0)
+            if i >= last:
+                kind = upper
+                friction = grid.upper_friction[axis]
+                outward = 1.0
+            if kind == STICK:
+                out = wp.vec3(0.0, 0.0, 0.0)
+            elif kind == FRICTION:
+                out = rub(out, axis, outward, friction)
+            else:
+                out[axis] = 0.0
+    return out
+
+
+@wp.func
+def folded(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)):
+    """Momentum and mass of a node in front of mirroring walls, with what was scattered behind them folded back."""
+    total = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    other = wp.vec3i(0, 0, 0)
+    for axis in range(3):
+        other[axis] = image(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
+    for combination in range(8):
+        at = node
+        valid = bool(True)
+        for axis in range(3):
+            if ((combination >> axis) & 1) == 1:
+                valid = valid and other[axis] != node[axis]
+                at[axis] = other[axis]
+        if valid:
+            value = raw_node(grid, world, at, table, raw)
+            for axis in range(3):
+                if ((combination >> axis) & 1) == 1:
+                    kind = wall_kind(at[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
+                    value = flipped(value, axis, kind)
+            total += value
+    return total
+
+
+@wp.func
+def near_wall(grid: Grid, node: wp.vec3i):
+    """Whether a node is within one cell of a wall, in front or behind."""
+    near = bool(False)
+    for axis in range(3):
+        walled = grid.lower_kind[axis] != PERIODIC
+        if walled and (node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1):
+            near = True
+    return near
+
+
+@wp.kernel
+def grid_step(
+    grid: Grid, lanes: int, active: wp.array(dtype=int), block_of: wp.array(dtype=int), table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4), dt: wp.array(dtype=float), gravity: wp.array(dtype=wp.vec3),
+    # outputs
+    moving: wp.array(dtype=wp.vec4),
+):  # fmt: skip
+    """Velocity of every node from momentum, gravity and walls; the fourth component is the node's mass.
+
+    Ghost nodes behind a mirroring wall get the mirrored velocity of their partner, so that the gather sees a true
+    mirror: zeroing them instead costs energy at every step.
+    """
+    t = wp.tid()
+    n = wp.min(active[0] * 64, raw.shape[0])
+    while t < n:
+        block = block_of[t >> 6]
+        world = block / grid.blocks_per_world
+        node = node_of(grid, block - world * grid.blocks_per_world, t & 63)
+        total = raw[t]
+        wall = near_wall(grid, node)
+        inside = node
+        if wall:
+            for axis in range(3):
+                inside[axis] = mirror(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
+            total = folded(grid, world, inside, table, raw)
+        result = wp.vec4(0.0, 0.0, 0.0, 0.0)
+        if total[3] > 0.0:
+            v = wp.vec3(total[0], total[1], total[2]) / total[3] + dt[world] * gravity[world]
+            if wall:
+                v = wall_velocity(grid, inside, v)
+            result = wp.vec4(v[0], v[1], v[2], total[3])
+            if wall:
+                for axis in range(3):
+                    if inside[axis] != node[axis]:
+                        kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
+                        result = flipped(result, axis, kind)
+        moving[t] = result
+        t += lanes
+
+
+@wp.func
+def contained(grid: Grid, x: wp.vec3):
+    """A position wrapped along periodic axes and kept in front of walls."""
+    out = x
+    for axis in range(3):
+        low, high = grid.lower[axis], grid.upper[axis]
+        if grid.wrap[axis] > 0:
+            if out[axis] < low:
+                out[axis] = out[axis] + (high - low)
+            elif out[axis] >= high:
+                out[axis] = out[axis] - (high - low)
+        else:
+            skin = 1.0e-3 * grid.dx
+            out[axis] = wp.clamp(out[axis], low + skin, high - skin)
+    return out
+
+
+@wp.kernel
+def g2p(
+    grid: Grid, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), moving: wp.array(dtype=wp.vec4),
+    held: wp.array(dtype=int),
+    # outputs
+    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), affine: wp.array(dtype=wp.mat33),
+    table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Velocity and affine velocity field of each particle from its 27 nodes (Jiang et al. 2015), then its motion."""
+    p = wp.tid()
+    world = p / capacity
+    if p - world * capacity < count[world]:
+        x = position[p]
+        base = first_node(grid, x)
+        v = velocity[p]
+        if held[p] == 0:
+            f = (x - grid.origin) * grid.inv_dx - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
+            wx0, wx1, wx2 = spline(f[0])
+            wy0, wy1, wy2 = spline(f[1])
+            wz0, wz1, wz2 = spline(f[2])
+            wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+            bx, by, bz, lx, ly, lz = node_parts(grid, base)
+            start = world * grid.blocks_per_world
+            v = wp.vec3(0.0, 0.0, 0.0)
+            cx, cy, cz = wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0)
+            for o in range(3):
+                vx = wp.vec3(0.0, 0.0, 0.0)
+                for q in range(3):
+                    vy = wp.vec3(0.0, 0.0, 0.0)
+                    for r in range(3):
+                        slot = wp.max(table[start + bx[o] + by[q] + bz[r]] - 1, 0)
+                        node = moving[slot * 64 + lx[o] + ly[q] + lz[r]]
+                        u = wz[r] * wp.vec3(node[0], node[1], node[2])
+                        vy += u
+                        cz += (wx[o] * wy[q] * (float(r) - f[2])) * u
+                    vx += wy[q] * vy
+                    cy += (wx[o] * wy[q] * (float(q) - f[1])) * vy
+                v += wx[o] * vx
+                cx += (wx[o] * (float(o) - f[0])) * vx
+            affine[p] = (4.0 * grid.inv_dx) * wp.matrix_from_cols(cx, cy, cz)
+            velocity[p] = v
+        x = contained(grid, x + dt[world] * v)
+        position[p] = x
+        after = first_node(grid, x)
+        if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
+            activate_stencil(grid, world, after, table, block_of, active, fault)

@@ -1,0 +1,155 @@
+"""The material point method: allocation, bounds and the order of passes."""
+
+import math
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import warp as wp
+from pydantic import Field
+
+from fluidbench.particles import Pool
+from fluidbench.scenario import Scenario
+from fluidbench.scene import Scene
+from fluidbench.solver import Config, Feature, Solver
+from fluidbench.timestep import Bound, damped_limit
+
+from ..order import CellOrder
+from . import kernels_warp as kernels
+from .grid import FAULT_BLOCKS, grid_of
+
+ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
+ISOLATED_VISCOUS = 0.25
+
+
+class ConfigMPM(Config):
+    grid_ratio: Annotated[float, Field(ge=1.0, le=4.0)] = Field(2.0, description="grid spacing over particle spacing")
+    safety: Annotated[float, Field(gt=0, le=1.0)] = Field(0.8, description="share of the exact stability limit used")
+    advection: Annotated[float, Field(gt=0, lt=1.0)] = Field(0.5, description="cells that matter may cross in a step")
+    blocks_per_particle: Annotated[float, Field(gt=0, le=8)] = Field(0.5, description="grid blocks to preallocate")
+
+
+class SolverMPM(Solver):
+    """MLS-MPM with APIC transfers, quadratic B-splines, symplectic Euler, on a block-sparse grid."""
+
+    name = "mpm"
+    paradigm = "hybrid: particles carry state, a background grid carries momentum"
+    features = frozenset(Feature)
+    Config: ClassVar = ConfigMPM
+    passes = ("clear_grid", "p2g", "grid_step", "g2p")
+    faults: ClassVar = {
+        FAULT_BLOCKS: "material spread over more grid blocks than allocated; raise numerics.mpm.blocks_per_particle",
+        kernels.FAULT_STENCIL: "a particle left the blocks of the grid within one step",
+    }
+
+    @classmethod
+    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
+        dx = config.grid_ratio * scenario.spacing
+        for axis, periodic in enumerate(scenario.domain.walls.periodic()):
+            cells = (scenario.domain.upper[axis] - scenario.domain.lower[axis]) / dx
+            if periodic and abs(cells - round(cells)) > 1e-3:
+                return f"the periodic {'xyz'[axis]} axis must hold a whole number of cells ({dx:g} m), not {cells:.4g}"
+        return None
+
+    @classmethod
+    def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
+        dx = config.grid_ratio * scenario.spacing
+        acoustic = ISOLATED_ACOUSTIC * dx / (scenario.wave_speed + speed)
+        nu = scenario.material.viscosity / scenario.material.density
+        viscous = ISOLATED_VISCOUS * dx * dx / nu if nu > 0 else math.inf
+        a = config.safety
+        limits = [
+            Bound("acoustic", a * acoustic, f"{a:g} dx / (sqrt(3) (c + v))", "validation H: isolated particle, exact"),
+            Bound("advective", config.advection * dx / max(speed, 1e-12), f"{config.advection:g} dx / v", "one cell"),
+        ]
+        if nu > 0:
+            limits += [
+                Bound("viscous", a * viscous, f"{a:g} dx^2 / (4 nu)", "validation H: isolated particle, exact"),
+                Bound(
+                    "acoustic-viscous",
+                    a * damped_limit(acoustic, viscous),
+                    "(dt/dt_acoustic)^2 + dt/dt_viscous < 1",
+                    "symplectic Euler of a damped oscillator",
+                ),
+            ]
+        return limits
+
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
+        self.scene, self.pool, self.config = scene, pool, config
+        self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
+        blocks = self.grid.blocks_per_world * scene.worlds
+        slots = min(blocks, 512 + int(config.blocks_per_particle * pool.size))
+        pool.add_field("affine", wp.mat33)
+        pool.add_field("volume_ratio", float, 1.0)
+        pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
+        pool.add_field("elastic_shear", wp.vec3)
+        with wp.ScopedDevice(scene.device):
+            self.table = wp.zeros(blocks, dtype=int)
+            self.block_of = wp.zeros(slots, dtype=int)
+            self.active = wp.zeros(1, dtype=int)
+            self.raw = wp.empty(slots * 64, dtype=wp.vec4)
+            self.moving = wp.empty(slots * 64, dtype=wp.vec4)
+        self.order = CellOrder(scene, pool, self.grid.dx)
+        self.node_lanes = min(scene.lanes, slots * 64)
+
+    def refresh(self) -> None:
+        pool, device = self.pool, self.scene.device
+        wp.launch(kernels.reset_blocks, self.node_lanes, [self.table, self.block_of, self.active, self.node_lanes], device=device)
+        self.active.zero_()
+        wp.launch(
+            kernels.find_blocks,
+            pool.size,
+            [self.grid, pool.capacity, pool.count, pool.position],
+            [self.table, self.block_of, self.active, pool.fault],
+            device=device,
+        )
+
+    def substep(self) -> None:
+        for name in self.passes:
+            getattr(self, name)()
+
+    def clear_grid(self) -> None:
+        wp.launch(kernels.clear_grid, self.node_lanes, [self.active, self.node_lanes, self.raw], device=self.scene.device)
+
+    def p2g(self) -> None:
+        pool, scene = self.pool, self.scene
+        wp.launch(
+            kernels.p2g,
+            pool.size,
+            [self.grid, pool.capacity, pool.count, scene.dt, scene.phases, pool.position, pool.velocity, pool.affine,
+             pool.mass, pool.volume, pool.phase, pool.held, self.table],
+            [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, pool.fault],
+            device=scene.device,
+        )  # fmt: skip
+
+    def grid_step(self) -> None:
+        wp.launch(
+            kernels.grid_step,
+            self.node_lanes,
+            [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.scene.dt,
+             self.scene.gravity],
+            [self.moving],
+            device=self.scene.device,
+        )  # fmt: skip
+
+    def g2p(self) -> None:
+        pool = self.pool
+        wp.launch(
+            kernels.g2p,
+            pool.size,
+            [self.grid, pool.capacity, pool.count, self.scene.dt, self.moving, pool.held],
+            [pool.position, pool.velocity, pool.affine, self.table, self.block_of, self.active, pool.fault],
+            device=self.scene.device,
+        )
+
+    def prepare(self) -> None:
+        wp.load_module(kernels, device=self.scene.device)
+
+    def sort_keys(self) -> Any:
+        return self.order.keys()
+
+    def densities(self) -> np.ndarray:
+        rest = np.array([s.material.density for s in self.scene.scenarios]).repeat(self.pool.capacity)
+        return rest / self.pool.volume_ratio.numpy()
+
+    def footprint(self) -> dict[str, int]:
+        return {name: getattr(self, name).capacity for name in ("table", "block_of", "raw", "moving")}

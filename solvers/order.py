@@ -1,0 +1,51 @@
+"""Memory order: keys that put particles of one cell side by side, block by block."""
+
+import numpy as np
+import warp as wp
+
+from fluidbench.particles import Pool
+from fluidbench.scene import Scene
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def cell_keys(
+    lower: wp.vec3, inv_cell: float, cells: wp.vec3i, capacity: int, count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3), keys: wp.array(dtype=wp.int64),
+):  # fmt: skip
+    """World, then blocks of 4 x 4 x 4 cells, then cells; unused slots come last within their world."""
+    p = wp.tid()
+    world = p / capacity
+    per_world = wp.int64(cells[0]) * wp.int64(cells[1]) * wp.int64(cells[2]) * wp.int64(64)
+    key = per_world
+    if p - world * capacity < count[world]:
+        x = (position[p] - lower) * inv_cell
+        i = wp.clamp(int(x[0]), 0, cells[0] * 4 - 1)
+        j = wp.clamp(int(x[1]), 0, cells[1] * 4 - 1)
+        k = wp.clamp(int(x[2]), 0, cells[2] * 4 - 1)
+        block = (wp.int64(i >> 2) * wp.int64(cells[1]) + wp.int64(j >> 2)) * wp.int64(cells[2]) + wp.int64(k >> 2)
+        key = block * wp.int64(64) + wp.int64(((i & 3) << 4) + ((j & 3) << 2) + (k & 3))
+    keys[p] = wp.int64(world) * (per_world + wp.int64(1)) + key
+
+
+class CellOrder:
+    """Sort keys of a pool for cells of a given edge [m]."""
+
+    def __init__(self, scene: Scene, pool: Pool, cell: float) -> None:
+        self.scene, self.pool, self.cell = scene, pool, cell
+        domain = scene.scenario.domain
+        length = np.asarray(domain.upper) - np.asarray(domain.lower)
+        self.blocks = wp.vec3i(*(np.ceil(length / (4 * cell)).astype(int) + 1).tolist())
+        self.values = wp.zeros(2 * pool.size, dtype=wp.int64, device=scene.device)
+
+    def keys(self) -> wp.array:
+        """Array of 2 * size int64, the keys in its first half, as the radix sort wants it."""
+        wp.launch(
+            cell_keys,
+            self.pool.size,
+            [self.scene.box.lower, 1.0 / self.cell, self.blocks, self.pool.capacity, self.pool.count,
+             self.pool.position, self.values],
+            device=self.scene.device,
+        )  # fmt: skip
+        return self.values

@@ -1,0 +1,34 @@
+"""Interpolation kernels and splines, as plain laws of floats (see bind.py)."""
+
+from math import pi
+
+
+def wendland(q: float, h: float):
+    """Wendland C2 kernel W(r) [1/m^3] in three dimensions at q = r / h, support 2 h. Wendland 1995."""
+    t = max(1.0 - 0.5 * q, 0.0)
+    return 21.0 / (16.0 * pi * h * h * h) * t * t * t * t * (1.0 + 2.0 * q)
+
+
+def wendland_slope(q: float, h: float):
+    """(dW/dr) / r of the Wendland C2 kernel [1/m^5]: grad W = slope * (x_i - x_j), finite at r = 0."""
+    t = max(1.0 - 0.5 * q, 0.0)
+    return -105.0 / (16.0 * pi * h * h * h * h * h) * t * t * t
+
+
+def poly6(r2: float, support: float):
+    """Poly6 kernel [1/m^3] of the squared distance, support H. Mueller et al. 2003."""
+    d = max(support * support - r2, 0.0)
+    h3 = support * support * support
+    return 315.0 / (64.0 * pi * h3 * h3 * h3) * d * d * d
+
+
+def spiky_slope(r: float, support: float):
+    """(dW/dr) [1/m^4] of the spiky kernel, support H. Mueller et al. 2003."""
+    d = max(support - r, 0.0)
+    h3 = support * support * support
+    return -45.0 / (pi * h3 * h3) * d * d
+
+
+def quadratic_spline(x: float):
+    """Weights of the three nearest nodes for a point x in [0.5, 1.5] past the first of them. Steffen et al. 2008."""
+    return 0.5 * (1.5 - x) * (1.5 - x), 0.75 - (x - 1.0) * (x - 1.0), 0.5 * (x - 0.5) * (x - 0.5)
