@@ -1,0 +1,232 @@
+"""Neighbour lists for SPH and PBD: a hash grid feeds lists that are reused until something has moved half a skin.
+
+Walls and periodic axes enter as images: a neighbour is a particle, or its image in a face. One list entry holds the
+index in its low 26 bits and the image code cx + 3 cy + 9 cz above them, c = 0 for none, 1 for the lower face's image,
+2 for the upper one's. A mirror image completes the kernel at a wall exactly; a periodic image is a shift.
+"""
+
+import numpy as np
+import warp as wp
+
+from fluidbench.particles import Pool
+from fluidbench.scene import PERIODIC, STICK, Box, Scene
+
+wp.set_module_options({"enable_backward": False})
+INDEX_BITS = wp.constant(26)
+INDEX_MASK = wp.constant(2**26 - 1)
+FAULT_NEIGHBOURS = 4
+
+
+@wp.func
+def image_code(code: int, axis: int):
+    """0, 1 or 2: which image the code means on one axis."""
+    digit = code
+    if axis == 1:
+        digit = code / 3
+    elif axis == 2:
+        digit = code / 9
+    return digit % 3
+
+
+@wp.func
+def image_position(box: Box, x: wp.vec3, code: int):
+    """The image of a point; undoing a periodic shift needs the opposite code."""
+    out = x
+    for axis in range(3):
+        c = image_code(code, axis)
+        if c == 1:
+            if box.lower_kind[axis] == PERIODIC:
+                out[axis] = x[axis] - (box.upper[axis] - box.lower[axis])
+            else:
+                out[axis] = 2.0 * box.lower[axis] - x[axis]
+        elif c == 2:
+            if box.upper_kind[axis] == PERIODIC:
+                out[axis] = x[axis] + (box.upper[axis] - box.lower[axis])
+            else:
+                out[axis] = 2.0 * box.upper[axis] - x[axis]
+    return out
+
+
+@wp.func
+def face_kind(box: Box, code: int, axis: int):
+    """Kind of the wall that the code mirrors in on this axis; PERIODIC where it mirrors in none."""
+    c = image_code(code, axis)
+    kind = int(PERIODIC)
+    if c == 1:
+        kind = box.lower_kind[axis]
+    elif c == 2:
+        kind = box.upper_kind[axis]
+    return kind
+
+
+@wp.func
+def image_velocity(box: Box, v: wp.vec3, code: int):
+    """A velocity seen in the walls: slip and friction mirror the normal component, stick turns all of them round."""
+    out = v
+    for axis in range(3):
+        kind = face_kind(box, code, axis)
+        if kind == STICK:
+            out = -out
+        elif kind != PERIODIC:
+            out[axis] = -out[axis]
+    return out
+
+
+@wp.func
+def contained(box: Box, x: wp.vec3):
+    """A position wrapped along periodic axes and kept in front of walls."""
+    out = x
+    for axis in range(3):
+        low, high = box.lower[axis], box.upper[axis]
+        if box.lower_kind[axis] == PERIODIC:
+            if x[axis] < low:
+                out[axis] = x[axis] + (high - low)
+            elif x[axis] >= high:
+                out[axis] = x[axis] - (high - low)
+        else:
+            out[axis] = wp.clamp(x[axis], low, high)
+    return out
+
+
+@wp.kernel
+def watch(
+    capacity: int, count: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), listed: wp.array(dtype=wp.vec3),
+    limit2: float,
+    # outputs
+    outdated: wp.array(dtype=int),
+):  # fmt: skip
+    """Mark the lists outdated once a particle has moved half the skin since they were made."""
+    i = wp.tid()
+    if i % capacity < count[i / capacity]:
+        if wp.length_sq(position[i] - listed[i]) > limit2:
+            outdated[0] = 1
+
+
+@wp.kernel
+def mark_worlds(capacity: int, worlds: int, count: wp.array(dtype=int), group: wp.array(dtype=int)):
+    """The world of each slot; unused slots belong to a world of their own."""
+    i = wp.tid()
+    group[i] = i / capacity
+    if i % capacity >= count[i / capacity]:
+        group[i] = worlds
+
+
+@wp.func
+def append(
+    grid: wp.uint64, world: int, i: int, at: wp.vec3, code: int, reach: float, position: wp.array(dtype=wp.vec3),
+    limit: int, found: int, row: int, column: int, entries: wp.array(dtype=int),
+):  # fmt: skip
+    """Add the particles within reach of `at` to the list of i; returns how many there are now."""
+    n = found
+    query = wp.hash_grid_query(grid, at, reach, world)
+    for j in query:
+        if wp.length_sq(position[j] - at) < reach * reach and (j != i or code > 0):
+            if n < limit:
+                entries[i * row + n * column] = j + (code << INDEX_BITS)
+            n += 1
+    return n
+
+
+@wp.kernel
+def fill_lists(
+    grid: wp.uint64, box: Box, group: wp.array(dtype=int), worlds: int, reach: float, limit: int, row: int, column: int,
+    position: wp.array(dtype=wp.vec3),
+    # outputs
+    entries: wp.array(dtype=int), number: wp.array(dtype=int), listed: wp.array(dtype=wp.vec3),
+    fault: wp.array(dtype=int), outdated: wp.array(dtype=int),
+):  # fmt: skip
+    """All neighbours within reach, images included."""
+    i = wp.tid()
+    world = group[i]
+    n = int(0)
+    if world < worlds:
+        x = position[i]
+        listed[i] = x
+        n = append(grid, world, i, x, 0, reach, position, limit, n, row, column, entries)
+        near = wp.vec3i(0, 0, 0)
+        for axis in range(3):
+            if x[axis] - box.lower[axis] < reach:
+                near[axis] = near[axis] + 1
+            if box.upper[axis] - x[axis] < reach:
+                near[axis] = near[axis] + 2
+        if near[0] + near[1] + near[2] > 0:
+            for code in range(1, 27):
+                wanted = bool(True)
+                undo = int(0)
+                power = int(1)
+                for axis in range(3):
+                    c = image_code(code, axis)
+                    wanted = wanted and (c == 0 or (near[axis] & c) != 0)
+                    if c > 0 and box.lower_kind[axis] == PERIODIC:
+                        c = 3 - c  # the query goes to where the shift comes from
+                    undo += c * power
+                    power *= 3
+                if wanted:
+                    # |x - image(y)| = |image^-1(x) - y|; the images within reach of x lie beyond the near face,
+                    # and a periodic one comes from the far side.
+                    n = append(
+                        grid, world, i, image_position(box, x, code), undo, reach, position, limit, n, row, column,
+                        entries,
+                    )  # fmt: skip
+        if n > limit:
+            wp.atomic_or(fault, 0, FAULT_NEIGHBOURS)
+            n = limit
+    number[i] = n
+    if i == 0:
+        outdated[0] = 0
+
+
+class Neighbours:
+    """Lists of all pairs within `radius`, valid while nothing has moved more than half of `skin` (both [m])."""
+
+    def __init__(self, scene: Scene, pool: Pool, radius: float, skin: float, limit: int) -> None:
+        self.scene, self.pool, self.limit = scene, pool, limit
+        self.reach, self.half_skin2 = radius + skin, (0.5 * skin) ** 2
+        # On the CPU a particle's list is contiguous; on a GPU the k-th entries of neighbouring threads are.
+        self.row, self.column = (limit, 1) if scene.device.is_cpu else (1, pool.size)
+        with wp.ScopedDevice(scene.device):
+            self.grid = wp.HashGrid(*_grid_shape(pool.capacity * scene.worlds))
+            self.grid.reserve(pool.size, with_groups=True)
+            self.entries = wp.empty(pool.size * limit, dtype=int)
+            self.number = wp.zeros(pool.size, dtype=int)
+            self.listed = wp.zeros(pool.size, dtype=wp.vec3)
+            self.group = wp.zeros(pool.size, dtype=int)
+            self.outdated = wp.ones(1, dtype=int)
+
+    def refresh(self) -> None:
+        """The pool was changed from outside: make the lists anew at the next substep."""
+        self.outdated.fill_(1)
+
+    def update(self) -> None:
+        """Enqueue the check of the lists and, on the device's own decision, their renewal."""
+        pool = self.pool
+        wp.launch(
+            watch,
+            pool.size,
+            [pool.capacity, pool.count, pool.position, self.listed, self.half_skin2],
+            [self.outdated],
+            device=self.scene.device,
+        )
+        wp.capture_if(self.outdated, on_true=self._renew)
+
+    def _renew(self) -> None:
+        pool, device = self.pool, self.scene.device
+        wp.launch(mark_worlds, pool.size, [pool.capacity, pool.worlds, pool.count], [self.group], device=device)
+        self.grid.build(pool.position, self.reach, groups=self.group)
+        wp.launch(
+            fill_lists,
+            pool.size,
+            [self.grid.id, self.scene.box, self.group, pool.worlds, self.reach, self.limit, self.row, self.column,
+             pool.position],
+            [self.entries, self.number, self.listed, pool.fault, self.outdated],
+            device=device,
+        )  # fmt: skip
+
+    def footprint(self) -> dict[str, int]:
+        return {"neighbour lists": self.entries.capacity + self.number.capacity + self.listed.capacity}
+
+
+def _grid_shape(particles: int) -> tuple[int, int, int]:
+    """Hash cells for that many particles: about one a particle, no fewer than 32 an axis."""
+    side = int(np.clip(2 ** np.ceil(np.log2(max(particles, 1)) / 3), 32, 256))
+    return (side, side, side)

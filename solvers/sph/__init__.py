@@ -1,0 +1,5 @@
+"""Weakly compressible SPH."""
+
+from .solver import SolverSPH
+
+__all__ = ["SolverSPH"]

@@ -1,0 +1,277 @@
+"""Weakly compressible SPH in Warp: continuity density, delta-SPH diffusion, the common material law.
+
+One substep: lists, strain (continuity, velocity gradient, stress), force (momentum), move. The velocity gradient uses
+the corrected kernel gradient (Randles & Libersky 1996, CMAME 139:375), so that rigid rotation makes no strain; the
+momentum equation is the symmetric, momentum-conserving form (Monaghan 2005, Rep. Prog. Phys. 68:1703).
+"""
+
+import functools
+from types import SimpleNamespace
+
+import warp as wp
+
+from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
+
+from .. import constitutive
+from ..bind import warp_func
+from ..neighbours import INDEX_BITS, INDEX_MASK, contained, face_kind, image_position, image_velocity
+from ..smoothing import wendland, wendland_slope
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+pressure = warp_func(constitutive.pressure)
+strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
+kernel = warp_func(wendland)
+slope = warp_func(wendland_slope)
+
+
+@wp.struct
+class Smoothing:
+    """Numbers of the discretisation."""
+
+    h: float  # smoothing length [m]
+    spacing: float  # [m]
+    sound_speed: float  # longitudinal wave speed [m/s]
+    density_diffusion: float  # delta [-]
+    artificial_viscosity: float  # alpha [-]
+    artificial_stress: float  # epsilon [-]
+
+
+@wp.struct
+class Lists:
+    entries: wp.array(dtype=int)
+    number: wp.array(dtype=int)
+    row: int
+    column: int
+
+
+@wp.func
+def symmetric_inverse(m: wp.mat33):
+    """Inverse of a moment matrix; the identity where too few neighbours make it ill-conditioned."""
+    inverse = wp.identity(n=3, dtype=float)
+    if wp.determinant(m) > 0.1:
+        inverse = wp.inverse(m)
+    return inverse
+
+
+@wp.func
+def mirrored_shear(box: Box, s: wp.vec3, code: int):
+    """Off-diagonal stress (xy, xz, yz) seen in slip or friction walls: components along the normal change sign."""
+    out = s
+    fx, fy, fz = face_kind(box, code, 0), face_kind(box, code, 1), face_kind(box, code, 2)
+    sx, sy, sz = float(1.0), float(1.0), float(1.0)
+    if fx == 0 or fx == FRICTION:
+        sx = -1.0
+    if fy == 0 or fy == FRICTION:
+        sy = -1.0
+    if fz == 0 or fz == FRICTION:
+        sz = -1.0
+    out = wp.vec3(sx * sy * s[0], sx * sz * s[1], sy * sz * s[2])
+    return out
+
+
+@functools.cache
+def passes(strength: bool, viscous: bool) -> SimpleNamespace:
+    """The passes for materials with or without shear stiffness and Newtonian viscosity: unused physics costs nothing."""
+    name = f"{'strength' if strength else 'liquid'}_{'viscous' if viscous else 'inviscid'}"
+
+    def strain(
+        num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
+        phases: wp.array2d(dtype=Phase), gravity: wp.array(dtype=wp.vec3), position: wp.array(dtype=wp.vec3),
+        velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), phase_of: wp.array(dtype=int),
+        held: wp.array(dtype=int), density: wp.array(dtype=float),
+        # outputs
+        elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+        new_density: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3),
+        stress_shear: wp.array(dtype=wp.vec3),
+    ):  # fmt: skip
+        i = wp.tid()
+        world = i / capacity
+        if i - world * capacity < count[world]:
+            phase = phases[world, phase_of[i]]
+            x = position[i]
+            v = velocity[i]
+            rho = density[i]
+            h2 = 4.0 * num.h * num.h
+            inv_h = 1.0 / num.h
+            # density that hydrostatic equilibrium adds per metre along gravity, kept out of the diffusion
+            # (Fourtakas et al. 2019, Comput. Fluids 190:346)
+            layering = (phase.density * phase.density / phase.bulk_modulus) * gravity[world]
+            divergence = float(0.0)
+            spread = float(0.0)
+            gradient = wp.mat33()
+            moment = wp.mat33()
+            start = i * lists.row
+            for k in range(lists.number[i]):
+                entry = lists.entries[start + k * lists.column]
+                j = entry & INDEX_MASK
+                code = entry >> INDEX_BITS
+                xj = position[j]
+                vj = velocity[j]
+                if code > 0:
+                    xj = image_position(box, xj, code)
+                    vj = image_velocity(box, vj, code)
+                r = x - xj
+                r2 = wp.dot(r, r)
+                if r2 < h2:
+                    f = slope(wp.sqrt(r2) * inv_h, num.h)
+                    rho_j = density[j]
+                    vol = mass[j] / rho_j
+                    w = vol * f
+                    u = v - vj
+                    divergence -= w * wp.dot(u, r)
+                    spread -= w * (rho_j - rho + wp.dot(layering, r))
+                    if wp.static(strength):
+                        gradient -= wp.outer(w * u, r)
+                        moment -= wp.outer(w * r, r)
+            if wp.static(strength):
+                # density from the corrected gradient, too: the same strain for pressure and for shear
+                gradient = gradient * symmetric_inverse(moment)
+                divergence = wp.trace(gradient)
+            h = dt[world]
+            rate = -rho * divergence + 2.0 * num.density_diffusion * num.h * num.sound_speed * spread
+            rho = wp.max(rho + h * rate, 0.1 * phase.density)
+            new_density[i] = rho
+            p = pressure(rho / phase.density - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+            scale = 1.0 / (rho * rho)
+            normal = wp.vec3(-p, -p, -p)
+            if wp.static(strength):
+                b = elastic_normal[i]
+                s = elastic_shear[i]
+                if held[i] == 0:
+                    b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
+                        gradient[0, 0], gradient[0, 1], gradient[0, 2], gradient[1, 0], gradient[1, 1],
+                        gradient[1, 2], gradient[2, 0], gradient[2, 1], gradient[2, 2],
+                        b[0], b[1], b[2], s[0], s[1], s[2],
+                        phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, h,
+                    )  # fmt: skip
+                    b = wp.vec3(b_xx, b_yy, b_zz)
+                    s = wp.vec3(b_xy, b_xz, b_yz)
+                    elastic_normal[i] = b
+                    elastic_shear[i] = s
+                g = phase.shear_modulus * rho / phase.density  # Cauchy from Kirchhoff: divide by J
+                mean = (b[0] + b[1] + b[2]) / 3.0
+                normal += g * (b - wp.vec3(mean, mean, mean))
+                stress_shear[i] = (scale * g) * s
+            stress_normal[i] = scale * normal
+
+    def force(
+        num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
+        phases: wp.array2d(dtype=Phase), gravity: wp.array(dtype=wp.vec3), position: wp.array(dtype=wp.vec3),
+        velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), phase_of: wp.array(dtype=int),
+        density: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3), stress_shear: wp.array(dtype=wp.vec3),
+        # outputs
+        acceleration: wp.array(dtype=wp.vec3),
+    ):  # fmt: skip
+        i = wp.tid()
+        world = i / capacity
+        if i - world * capacity < count[world]:
+            phase = phases[world, phase_of[i]]
+            x = position[i]
+            v = velocity[i]
+            rho = density[i]
+            sn = stress_normal[i]
+            ss = wp.vec3(0.0, 0.0, 0.0)
+            if wp.static(strength):
+                ss = stress_shear[i]
+            h2 = 4.0 * num.h * num.h
+            inv_h = 1.0 / num.h
+            shock = num.artificial_viscosity * num.h * num.sound_speed
+            inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
+            a = wp.vec3(0.0, 0.0, 0.0)
+            wall = wp.vec3(0.0, 0.0, 0.0)
+            start = i * lists.row
+            for k in range(lists.number[i]):
+                entry = lists.entries[start + k * lists.column]
+                j = entry & INDEX_MASK
+                code = entry >> INDEX_BITS
+                xj = position[j]
+                vj = velocity[j]
+                if code > 0:
+                    xj = image_position(box, xj, code)
+                    vj = image_velocity(box, vj, code)
+                r = x - xj
+                r2 = wp.dot(r, r)
+                if r2 < h2:
+                    q = wp.sqrt(r2) * inv_h
+                    f = mass[j] * slope(q, num.h)
+                    u = v - vj
+                    ur = wp.dot(u, r)
+                    # artificial viscosity, for approaching particles (Monaghan 1992)
+                    scalar = shock * wp.min(ur, 0.0) / ((r2 + 0.01 * num.h * num.h) * rho)
+                    if wp.static(viscous):
+                        # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
+                        scalar += 10.0 * phase.viscosity * ur / ((r2 + 1.0e-4 * num.h * num.h) * rho * density[j])
+                    n = sn + stress_normal[j]
+                    push = wp.vec3(n[0] * r[0], n[1] * r[1], n[2] * r[2])
+                    if wp.static(strength):
+                        sj = stress_shear[j]
+                        if code > 0:
+                            sj = mirrored_shear(box, sj, code)
+                        t = ss + sj
+                        push += wp.vec3(
+                            t[0] * r[1] + t[1] * r[2], t[0] * r[0] + t[2] * r[2], t[1] * r[0] + t[2] * r[1]
+                        )
+                        # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
+                        tension = wp.max(n[0] + n[1] + n[2], 0.0) / 3.0
+                        if tension > 0.0:
+                            ratio = kernel(q, num.h) * inv_w
+                            scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio
+                    push = f * (push + scalar * r)
+                    if code > 0:
+                        for axis in range(3):
+                            if face_kind(box, code, axis) == FRICTION:
+                                wall[axis] = wall[axis] + push[axis]
+                                push[axis] = 0.0
+                    a += push
+            # Friction walls push but never pull, and rub by Coulomb's law.
+            for axis in range(3):
+                if wall[axis] != 0.0:
+                    inward = wp.sign(0.5 * (box.lower[axis] + box.upper[axis]) - x[axis])
+                    normal = wp.max(inward * wall[axis], 0.0)
+                    friction = box.lower_friction[axis]
+                    if inward < 0.0:
+                        friction = box.upper_friction[axis]
+                    slide = v + dt[world] * (a + gravity[world])
+                    slide[axis] = 0.0
+                    speed = wp.length(slide)
+                    grip = wp.min(friction * normal, speed / dt[world])
+                    a -= (grip / wp.max(speed, 1.0e-12)) * slide
+                    a[axis] = a[axis] + inward * normal
+            acceleration[i] = a + gravity[world]
+
+    return SimpleNamespace(
+        strain=_named(strain, name),
+        force=_named(force, name),
+    )
+
+
+def _named(function, name: str) -> wp.Kernel:
+    """A kernel in a module of its own, under a name that tells its variant."""
+    function.__name__ = f"{function.__name__}_{name}"
+    return wp.kernel(function, module="unique", enable_backward=False)
+
+
+@wp.kernel
+def move(
+    box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
+    acceleration: wp.array(dtype=wp.vec3), new_density: wp.array(dtype=float),
+    # outputs
+    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), density: wp.array(dtype=float),
+):  # fmt: skip
+    """Symplectic Euler; a particle that would cross a wall stops at it."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        h = dt[world]
+        v = velocity[i]
+        if held[i] == 0:
+            v += h * acceleration[i]
+        free = position[i] + h * v
+        x = contained(box, free)
+        for axis in range(3):
+            if x[axis] != free[axis] and box.lower_kind[axis] != PERIODIC:
+                v[axis] = 0.0
+        position[i] = x
+        velocity[i] = v
+        density[i] = new_density[i]

@@ -1,0 +1,164 @@
+"""Weakly compressible SPH: allocation, bounds and the order of passes."""
+
+import math
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import warp as wp
+from pydantic import Field
+
+from fluidbench.particles import Pool
+from fluidbench.scenario import Scenario
+from fluidbench.scene import Scene
+from fluidbench.solver import Config, Feature, Solver
+from fluidbench.timestep import Bound
+
+from .. import neighbours
+from ..neighbours import FAULT_NEIGHBOURS, Neighbours
+from ..order import CellOrder
+from . import kernels_warp as kernels
+
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class ConfigSPH(Config):
+    smoothing_ratio: Annotated[float, Field(ge=1.0, le=3.0)] = Field(1.2, description="smoothing length h over spacing")
+    cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
+    viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
+    force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
+    density_diffusion: NonNegative = Field(0.1, description="delta of delta-SPH")
+    artificial_viscosity: NonNegative = Field(0.02, description="alpha for liquids")
+    artificial_viscosity_solid: NonNegative = Field(0.1, description="alpha for materials with shear stiffness")
+    artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
+    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.2, description="reach of the lists beyond the support, over h")
+    max_neighbours: Annotated[int, Field(ge=32, le=1024)] = Field(160, description="room in a particle's list")
+
+    def alpha(self, solid: bool) -> float:
+        return self.artificial_viscosity_solid if solid else self.artificial_viscosity
+
+
+class SolverSPH(Solver):
+    """WCSPH with Wendland C2 kernel, delta-SPH density diffusion, mirror-image walls, symplectic Euler."""
+
+    name = "sph"
+    paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
+    features = frozenset(Feature)
+    Config: ClassVar = ConfigSPH
+    passes = ("lists", "strain", "force", "move")
+    faults: ClassVar = {FAULT_NEIGHBOURS: "a particle has more neighbours than numerics.sph.max_neighbours"}
+
+    @classmethod
+    def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
+        h = config.smoothing_ratio * scenario.spacing
+        c, m = scenario.wave_speed, scenario.material
+        # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1).
+        nu = m.viscosity / m.density + config.alpha(m.youngs_modulus is not None) * h * c / 10.0
+        g = float(np.linalg.norm(scenario.acceleration))
+        a = config
+        return [
+            Bound("acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; validation H: < 1.73"),
+            Bound(
+                "viscous",
+                a.viscous_number * h * h / nu if nu > 0 else math.inf,
+                f"{a.viscous_number:g} h^2 / nu, artificial viscosity included",
+                "validation H: 0.111 h^2 / nu for the Monaghan-Gingold operator",
+            ),
+            Bound(
+                "force",
+                a.force_number * math.sqrt(h / g) if g > 0 else math.inf,
+                f"{a.force_number:g} sqrt(h / g)",
+                "Monaghan 1992",
+            ),
+        ]
+
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
+        self.scene, self.pool, self.config = scene, pool, config
+        self.kernels = kernels.passes(scene.elastic, scene.viscous)
+        self.num = kernels.Smoothing()
+        self.num.h = config.smoothing_ratio * scene.spacing
+        self.num.spacing = scene.spacing
+        self.num.sound_speed = scene.wave_speed
+        self.num.density_diffusion = config.density_diffusion
+        self.num.artificial_viscosity = config.alpha(scene.elastic)
+        self.num.artificial_stress = config.artificial_stress
+        pool.add_field("density", float, scene.scenario.material.density)
+        self._rest_densities()
+        solid = pool.size if scene.elastic else 1
+        if scene.elastic:
+            pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
+            pool.add_field("elastic_shear", wp.vec3)
+        with wp.ScopedDevice(scene.device):
+            self.unused = wp.zeros(1, dtype=wp.vec3)
+            self.new_density = wp.zeros(pool.size, dtype=float)
+            self.stress_normal = wp.zeros(pool.size, dtype=wp.vec3)
+            self.stress_shear = wp.zeros(solid, dtype=wp.vec3)
+            self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
+        self.neighbours = Neighbours(scene, pool, 2.0 * self.num.h, config.skin * self.num.h, config.max_neighbours)
+        self.pairs = kernels.Lists()
+        self.pairs.entries, self.pairs.number = self.neighbours.entries, self.neighbours.number
+        self.pairs.row, self.pairs.column = self.neighbours.row, self.neighbours.column
+        self.order = CellOrder(scene, pool, self.num.h)
+
+    def _rest_densities(self) -> None:
+        """Every slot starts at its world's rest density."""
+        rest = np.repeat([s.material.density for s in self.scene.scenarios], self.pool.capacity)
+        self.pool.density.assign(rest.astype(np.float32))
+
+    def refresh(self) -> None:
+        self.neighbours.refresh()
+
+    def substep(self) -> None:
+        for name in self.passes:
+            getattr(self, name)()
+
+    def lists(self) -> None:
+        self.neighbours.update()
+
+    def _common(self) -> list[Any]:
+        pool, scene = self.pool, self.scene
+        return [self.num, scene.box, self.pairs, pool.capacity, pool.count, scene.dt, scene.phases, scene.gravity,
+                pool.position, pool.velocity, pool.mass, pool.phase]  # fmt: skip
+
+    def strain(self) -> None:
+        pool = self.pool
+        elastic = [pool.elastic_normal, pool.elastic_shear] if self.scene.elastic else [self.unused, self.unused]
+        wp.launch(
+            self.kernels.strain,
+            pool.size,
+            [*self._common(), pool.held, pool.density],
+            [*elastic, self.new_density, self.stress_normal, self.stress_shear],
+            device=self.scene.device,
+        )
+
+    def force(self) -> None:
+        wp.launch(
+            self.kernels.force,
+            self.pool.size,
+            [*self._common(), self.new_density, self.stress_normal, self.stress_shear],
+            [self.acceleration],
+            device=self.scene.device,
+        )
+
+    def move(self) -> None:
+        pool, scene = self.pool, self.scene
+        wp.launch(
+            kernels.move,
+            pool.size,
+            [scene.box, pool.capacity, pool.count, scene.dt, pool.held, self.acceleration, self.new_density],
+            [pool.position, pool.velocity, pool.density],
+            device=scene.device,
+        )
+
+    def prepare(self) -> None:
+        for module in (kernels, neighbours, self.kernels.strain.module, self.kernels.force.module):
+            wp.load_module(module if hasattr(module, "__file__") else module.name, device=self.scene.device)
+
+    def sort_keys(self) -> Any:
+        return self.order.keys()
+
+    def densities(self) -> np.ndarray:
+        return self.pool.density.numpy()
+
+    def footprint(self) -> dict[str, int]:
+        own = {name: getattr(self, name).capacity for name in ("new_density", "stress_normal", "stress_shear", "acceleration")}
+        return own | self.neighbours.footprint()
