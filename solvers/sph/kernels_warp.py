@@ -92,7 +92,6 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             x = position[i]
             v = velocity[i]
             rho = density[i]
-            h2 = 4.0 * num.h * num.h
             inv_h = 1.0 / num.h
             # density that hydrostatic equilibrium adds per metre along gravity, kept out of the diffusion
             # (Fourtakas et al. 2019, Comput. Fluids 190:346)
@@ -113,17 +112,16 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     vj = image_velocity(box, vj, code)
                 r = x - xj
                 r2 = wp.dot(r, r)
-                if r2 < h2:
-                    f = slope(wp.sqrt(r2) * inv_h, num.h)
-                    rho_j = density[j]
-                    vol = mass[j] / rho_j
-                    w = vol * f
-                    u = v - vj
-                    divergence -= w * wp.dot(u, r)
-                    spread -= w * (rho_j - rho + wp.dot(layering, r))
-                    if wp.static(strength):
-                        gradient -= wp.outer(w * u, r)
-                        moment -= wp.outer(w * r, r)
+                f = slope(wp.sqrt(r2) * inv_h, num.h)
+                rho_j = density[j]
+                vol = mass[j] / rho_j
+                w = vol * f
+                u = v - vj
+                divergence -= w * wp.dot(u, r)
+                spread -= w * (rho_j - rho + wp.dot(layering, r))
+                if wp.static(strength):
+                    gradient -= wp.outer(w * u, r)
+                    moment -= wp.outer(w * r, r)
             if wp.static(strength):
                 # density from the corrected gradient, too: the same strain for pressure and for shear
                 gradient = gradient * symmetric_inverse(moment)
@@ -174,7 +172,6 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             ss = wp.vec3(0.0, 0.0, 0.0)
             if wp.static(strength):
                 ss = stress_shear[i]
-            h2 = 4.0 * num.h * num.h
             inv_h = 1.0 / num.h
             shock = num.artificial_viscosity * num.h * num.sound_speed
             inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
@@ -192,38 +189,37 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     vj = image_velocity(box, vj, code)
                 r = x - xj
                 r2 = wp.dot(r, r)
-                if r2 < h2:
-                    q = wp.sqrt(r2) * inv_h
-                    f = mass[j] * slope(q, num.h)
-                    u = v - vj
-                    ur = wp.dot(u, r)
-                    # artificial viscosity, for approaching particles (Monaghan 1992)
-                    scalar = shock * wp.min(ur, 0.0) / ((r2 + 0.01 * num.h * num.h) * rho)
-                    if wp.static(viscous):
-                        # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
-                        scalar += 10.0 * phase.viscosity * ur / ((r2 + 1.0e-4 * num.h * num.h) * rho * density[j])
-                    n = sn + stress_normal[j]
-                    push = wp.vec3(n[0] * r[0], n[1] * r[1], n[2] * r[2])
-                    if wp.static(strength):
-                        sj = stress_shear[j]
-                        if code > 0:
-                            sj = mirrored_shear(box, sj, code)
-                        t = ss + sj
-                        push += wp.vec3(
-                            t[0] * r[1] + t[1] * r[2], t[0] * r[0] + t[2] * r[2], t[1] * r[0] + t[2] * r[1]
-                        )
-                        # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
-                        tension = wp.max(n[0] + n[1] + n[2], 0.0) / 3.0
-                        if tension > 0.0:
-                            ratio = kernel(q, num.h) * inv_w
-                            scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio
-                    push = f * (push + scalar * r)
+                q = wp.sqrt(r2) * inv_h
+                f = mass[j] * slope(q, num.h)
+                u = v - vj
+                ur = wp.dot(u, r)
+                # artificial viscosity, for approaching particles (Monaghan 1992)
+                scalar = shock * wp.min(ur, 0.0) / ((r2 + 0.01 * num.h * num.h) * rho)
+                if wp.static(viscous):
+                    # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
+                    scalar += 10.0 * phase.viscosity * ur / ((r2 + 1.0e-4 * num.h * num.h) * rho * density[j])
+                n = sn + stress_normal[j]
+                push = wp.vec3(n[0] * r[0], n[1] * r[1], n[2] * r[2])
+                if wp.static(strength):
+                    sj = stress_shear[j]
                     if code > 0:
-                        for axis in range(3):
-                            if face_kind(box, code, axis) == FRICTION:
-                                wall[axis] = wall[axis] + push[axis]
-                                push[axis] = 0.0
-                    a += push
+                        sj = mirrored_shear(box, sj, code)
+                    t = ss + sj
+                    push += wp.vec3(
+                        t[0] * r[1] + t[1] * r[2], t[0] * r[0] + t[2] * r[2], t[1] * r[0] + t[2] * r[1]
+                    )
+                    # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
+                    tension = wp.max(n[0] + n[1] + n[2], 0.0) / 3.0
+                    if tension > 0.0:
+                        ratio = kernel(q, num.h) * inv_w
+                        scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio
+                push = f * (push + scalar * r)
+                if code > 0:
+                    for axis in range(3):
+                        if face_kind(box, code, axis) == FRICTION:
+                            wall[axis] = wall[axis] + push[axis]
+                            push[axis] = 0.0
+                a += push
             # Friction walls push but never pull, and rub by Coulomb's law.
             for axis in range(3):
                 if wall[axis] != 0.0:

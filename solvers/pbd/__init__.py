@@ -1,0 +1,5 @@
+"""Position-based dynamics."""
+
+from .solver import SolverPBD
+
+__all__ = ["SolverPBD"]

@@ -1,0 +1,200 @@
+"""Position-based dynamics: allocation, bounds and the order of passes."""
+
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import warp as wp
+from pydantic import Field
+
+from fluidbench.particles import Pool
+from fluidbench.scenario import Scenario
+from fluidbench.scene import Scene
+from fluidbench.solver import Config, Feature, Solver
+from fluidbench.timestep import Bound
+
+from .. import neighbours
+from ..neighbours import FAULT_NEIGHBOURS, Neighbours
+from ..order import CellOrder
+from ..smoothing import poly6
+from . import kernels_warp as kernels
+
+
+class ConfigPBD(Config):
+    support_ratio: Annotated[float, Field(ge=2.0, le=4.0)] = Field(2.3, description="kernel radius H over spacing")
+    iterations: Annotated[int, Field(ge=1, le=200)] = Field(6, description="density iterations per substep")
+    advance: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="accuracy: spacings moved per substep")
+    relaxation: Annotated[float, Field(gt=0)] = Field(0.02, description="constraint force mixing epsilon")
+    over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
+    shear_sweeps: Annotated[int, Field(ge=1, le=64)] = Field(4, description="XSPH sweeps per substep")
+    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
+    max_neighbours: Annotated[int, Field(ge=32, le=1024)] = Field(160, description="room in a particle's list")
+
+
+def largest_viscosity(scenario: Scenario, config: ConfigPBD, dt: float) -> float:
+    """The most that XSPH sweeps can stand for at this dt [Pa s]: rho sweeps H^2 / (22 dt) (validation C)."""
+    support = config.support_ratio * scenario.spacing
+    return scenario.material.density * config.shear_sweeps * support**2 / (22.0 * dt)
+
+
+class SolverPBD(Solver):
+    """Position-based fluids with one-sided density constraints and XSPH for viscosity and yield."""
+
+    name = "pbd"
+    paradigm = "particles projected onto constraints; velocity follows from the change of position"
+    features = frozenset({Feature.VISCOSITY, Feature.FRICTION, Feature.PERIODIC})
+    Config: ClassVar = ConfigPBD
+    faults: ClassVar = {FAULT_NEIGHBOURS: "a particle has more neighbours than numerics.pbd.max_neighbours"}
+    passes = ("predict", "lists", "multipliers", "correct", "apply", "velocities", "shear", "rub")
+
+    @classmethod
+    def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
+        m, words = scenario.material, []
+        dt = min(bound.dt for bound in cls.bounds(scenario, config, scenario.reference_speed))
+        most = largest_viscosity(scenario, config, min(dt, scenario.schedule[0]))
+        if m.viscosity > most:
+            words.append(f"viscosity {m.viscosity:g} Pa s acts like at most {most:.3g} Pa s (XSPH at this dt)")
+        if m.youngs_modulus is not None:
+            words.append("no elastic shear stress: a constraint is met or not, whatever Young's modulus says")
+        if m.flow_threshold > 0:
+            words.append(f"yield stress becomes an apparent viscosity of at most {most:.3g} Pa s: it creeps, never rests")
+        return [*words, "pressure is whatever keeps rho <= rho0: no equation of state, no sound speed"]
+
+    @classmethod
+    def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
+        d, g = scenario.spacing, float(np.linalg.norm(scenario.acceleration))
+        a = config.advance
+        limits = [Bound("accuracy", a * d / max(speed, 1e-12), f"{a:g} d / v", "validation H: no stability bound")]
+        if g > 0:
+            limits.append(Bound("free fall", (a * d / g) ** 0.5, f"sqrt({a:g} d / |g|)", "same, from rest"))
+        return limits
+
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
+        self.scene, self.pool, self.config = scene, pool, config
+        self.num = kernels.Numbers()
+        self.num.support = config.support_ratio * scene.spacing
+        self.num.spacing = scene.spacing
+        self.num.weight = 1.0 / _lattice_sum(config.support_ratio)
+        self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
+        self.num.sweeps = config.shear_sweeps
+        with wp.ScopedDevice(scene.device):
+            self.start = wp.zeros(pool.size, dtype=wp.vec3)
+            self.correction = wp.zeros(pool.size, dtype=wp.vec3)
+            self.smoothed = wp.zeros(pool.size, dtype=wp.vec3)
+            self.multiplier = wp.zeros(pool.size, dtype=float)
+            self.fill = wp.ones(pool.size, dtype=float)
+        self.neighbours = Neighbours(scene, pool, self.num.support, config.skin * scene.spacing, config.max_neighbours)
+        self.pairs = kernels.Lists()
+        self.pairs.entries, self.pairs.number = self.neighbours.entries, self.neighbours.number
+        self.pairs.row, self.pairs.column = self.neighbours.row, self.neighbours.column
+        self.order = CellOrder(scene, pool, self.num.support)
+        self.shears = scene.elastic or scene.viscous or any(box_has_friction(s) for s in scene.scenarios)
+
+    def refresh(self) -> None:
+        self.neighbours.refresh()
+
+    def substep(self) -> None:
+        self.predict()
+        self.lists()
+        for _ in range(self.config.iterations):
+            self.multipliers()
+            self.correct()
+            self.apply()
+        self.velocities()
+        if self.shears:
+            for _ in range(self.config.shear_sweeps):
+                self.shear()
+                self.rub()
+
+    def _launch(self, kernel: wp.Kernel, inputs: list[Any], outputs: list[Any]) -> None:
+        wp.launch(kernel, self.pool.size, inputs, outputs, device=self.scene.device)
+
+    def _active(self) -> list[Any]:
+        return [self.pool.capacity, self.pool.count]
+
+    def predict(self) -> None:
+        pool, scene = self.pool, self.scene
+        self._launch(
+            kernels.predict,
+            [scene.box, *self._active(), scene.dt, scene.gravity, pool.held],
+            [pool.position, pool.velocity, self.start],
+        )
+
+    def lists(self) -> None:
+        self.neighbours.update()
+
+    def multipliers(self) -> None:
+        pool = self.pool
+        self._launch(
+            kernels.multipliers,
+            [self.num, self.scene.box, self.pairs, *self._active(), pool.position, pool.volume],
+            [self.multiplier, self.fill],
+        )
+
+    def correct(self) -> None:
+        pool = self.pool
+        self._launch(
+            kernels.correct,
+            [self.num, self.scene.box, self.pairs, *self._active(), pool.held, pool.position, pool.volume,
+             self.multiplier],
+            [self.correction],
+        )  # fmt: skip
+
+    def apply(self) -> None:
+        pool = self.pool
+        self._launch(
+            kernels.apply,
+            [self.num, self.scene.box, *self._active(), pool.held, self.correction],
+            [pool.position, self.start],
+        )
+
+    def velocities(self) -> None:
+        pool = self.pool
+        self._launch(
+            kernels.velocities,
+            [*self._active(), self.scene.dt, pool.held],
+            [pool.position, self.start, pool.velocity],
+        )
+
+    def shear(self) -> None:
+        pool, scene = self.pool, self.scene
+        self._launch(
+            kernels.shear,
+            [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
+             pool.position, pool.volume, pool.velocity],
+            [self.smoothed],
+        )  # fmt: skip
+
+    def rub(self) -> None:
+        pool, scene = self.pool, self.scene
+        self._launch(
+            kernels.rub,
+            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.gravity, self.smoothed],
+            [pool.position, pool.velocity],
+        )
+
+    def prepare(self) -> None:
+        for module in (kernels, neighbours):
+            wp.load_module(module, device=self.scene.device)
+
+    def sort_keys(self) -> Any:
+        return self.order.keys()
+
+    def densities(self) -> np.ndarray:
+        rest = np.array([s.material.density for s in self.scene.scenarios]).repeat(self.pool.capacity)
+        return rest * np.maximum(self.fill.numpy(), 1.0)
+
+    def footprint(self) -> dict[str, int]:
+        own = {name: getattr(self, name).capacity for name in ("start", "correction", "smoothed", "multiplier", "fill")}
+        return own | self.neighbours.footprint()
+
+
+def box_has_friction(scenario: Scenario) -> bool:
+    return any(not isinstance(wall, str) for wall in scenario.domain.walls.faces())
+
+
+def _lattice_sum(support_ratio: float) -> float:
+    """Kernel sum of unit volumes on a cubic lattice of unit spacing."""
+    n = int(support_ratio) + 1
+    axis = np.arange(-n, n + 1)
+    r2 = sum(np.square(g) for g in np.meshgrid(axis, axis, axis))
+    return float(sum(poly6(float(value), support_ratio) for value in np.ravel(r2)))
