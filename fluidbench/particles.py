@@ -6,7 +6,6 @@ import numpy as np
 import warp as wp
 
 from .errors import UserError
-from .scenario import Body, Scenario
 from .scene import Scene
 
 wp.set_module_options({"enable_backward": False})
@@ -120,26 +119,3 @@ class Pool:
 def gather(order: wp.array(dtype=int), source: wp.array(dtype=Any), target: wp.array(dtype=Any)):  # type: ignore[valid-type]
     i = wp.tid()
     target[i] = source[order[i]]
-
-
-def sample(body: Body, scenario: Scenario) -> tuple[np.ndarray, float]:
-    """(positions (n, 3) [m], volume of a particle [m^3]) of a body's part inside the domain.
-
-    A cubic lattice of the scenario's spacing, centred on the body; the particle volume makes the whole body's volume
-    exact.
-    """
-    cells = np.maximum(1, np.rint(2.0 * body.extent / scenario.spacing).astype(int))
-    axes = [(np.arange(n) + 0.5) * scenario.spacing - 0.5 * n * scenario.spacing for n in cells]
-    if body.kind == "box":
-        axes = [axis * (2.0 * half / (n * scenario.spacing)) for axis, half, n in zip(axes, body.extent, cells, strict=True)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    if body.kind == "cylinder":
-        points = points[np.hypot(points[:, 0], points[:, 1]) <= body.extent[0]]
-    elif body.kind == "sphere":
-        points = points[np.linalg.norm(points, axis=1) <= body.extent[0]]
-    volume = body.volume / len(points)
-    points = points + np.asarray(body.center)
-    if scenario.jitter:
-        shift = np.random.default_rng(scenario.seed).uniform(-1, 1, points.shape)
-        points = points + scenario.jitter * scenario.spacing * shift
-    return points[scenario.domain.contains(points)], volume

@@ -12,9 +12,10 @@ import warp as wp
 from . import health
 from .errors import UserError
 from .health import Health, Vital
-from .particles import OutOfCapacity, Pool, sample
+from .layout import capacity_of, sample
+from .particles import OutOfCapacity, Pool
 from .process import emission
-from .process.emission import Emission, Stream
+from .process.emission import Emission
 from .scenario import Scenario
 from .scene import Scene
 from .solver import Solver, configure, get_solver
@@ -51,12 +52,6 @@ class Outcome:
     prepare_wall: float = 0.0
     binding: dict[str, float] = field(default_factory=dict)
     peak_particles: int = 0
-
-
-def capacity_of(scenario: Scenario) -> int:
-    """Particles that a scenario will ever hold."""
-    bodies = sum(len(sample(body, scenario)[0]) for body in scenario.bodies)
-    return bodies + (Stream(scenario).particles if scenario.nozzle is not None else 0)
 
 
 class Simulation:

@@ -50,6 +50,8 @@ class Solver(ABC):
     Config: ClassVar[type[Config]]
     passes: ClassVar[tuple[str, ...]]
     faults: ClassVar[dict[int, str]] = {}
+    typical_rate: ClassVar[float] = 1.0e6  # particle-substeps a second on one core, for estimates only
+    typical_bytes: ClassVar[float] = 300.0  # bytes a particle, for estimates only
 
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:

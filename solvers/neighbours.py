@@ -15,6 +15,7 @@ wp.set_module_options({"enable_backward": False})
 INDEX_BITS = wp.constant(26)
 INDEX_MASK = wp.constant(2**26 - 1)
 FAULT_NEIGHBOURS = 4
+WALL_INSET = wp.constant(0.2)  # closest approach to a wall, in particle spacings; at rest the first layer is at 0.5
 
 
 @wp.func
@@ -73,8 +74,8 @@ def image_velocity(box: Box, v: wp.vec3, code: int):
 
 
 @wp.func
-def contained(box: Box, x: wp.vec3):
-    """A position wrapped along periodic axes and kept in front of walls."""
+def contained(box: Box, x: wp.vec3, inset: float):
+    """A position wrapped along periodic axes and kept `inset` in front of walls, so it never meets its own image."""
     out = x
     for axis in range(3):
         low, high = box.lower[axis], box.upper[axis]
@@ -84,7 +85,7 @@ def contained(box: Box, x: wp.vec3):
             elif x[axis] >= high:
                 out[axis] = x[axis] - (high - low)
         else:
-            out[axis] = wp.clamp(x[axis], low, high)
+            out[axis] = wp.clamp(x[axis], low + inset, high - inset)
     return out
 
 

@@ -41,6 +41,8 @@ class SolverMPM(Solver):
         kernels.FAULT_STENCIL: "a particle left the blocks of the grid within one step",
     }
 
+    typical_rate, typical_bytes = 3.5e6, 2500.0
+
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
         dx = config.grid_ratio * scenario.spacing

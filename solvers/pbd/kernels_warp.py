@@ -10,7 +10,7 @@ import warp as wp
 from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
 
 from ..bind import warp_func
-from ..neighbours import INDEX_BITS, INDEX_MASK, contained, face_kind, image_position, image_velocity
+from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, contained, face_kind, image_position, image_velocity
 from ..smoothing import poly6, spiky_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -41,8 +41,8 @@ class Lists:
 
 @wp.kernel
 def predict(
-    box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), gravity: wp.array(dtype=wp.vec3),
-    held: wp.array(dtype=int),
+    num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
+    gravity: wp.array(dtype=wp.vec3), held: wp.array(dtype=int),
     # outputs
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), start: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
@@ -55,7 +55,7 @@ def predict(
         if held[i] == 0:
             v += h * gravity[world]
         velocity[i] = v
-        x = contained(box, position[i] + h * v)
+        x = contained(box, position[i] + h * v, WALL_INSET * num.spacing)
         start[i] = x - h * v  # so that a periodic wrap or a wall does not count as motion twice
         position[i] = x
 
@@ -137,7 +137,7 @@ def apply(
         if length > limit:
             shift = shift * (limit / length)
         free = position[i] + shift
-        x = contained(box, free)
+        x = contained(box, free, WALL_INSET * num.spacing)
         for axis in range(3):
             if box.lower_kind[axis] == PERIODIC and x[axis] != free[axis]:
                 from_start = start[i]

@@ -14,7 +14,7 @@ from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
 
 from .. import constitutive
 from ..bind import warp_func
-from ..neighbours import INDEX_BITS, INDEX_MASK, contained, face_kind, image_position, image_velocity
+from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, contained, face_kind, image_position, image_velocity
 from ..smoothing import wendland, wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -49,7 +49,7 @@ class Lists:
 def symmetric_inverse(m: wp.mat33):
     """Inverse of a moment matrix; the identity where too few neighbours make it ill-conditioned."""
     inverse = wp.identity(n=3, dtype=float)
-    if wp.determinant(m) > 0.1:
+    if wp.determinant(m) > 0.3:
         inverse = wp.inverse(m)
     return inverse
 
@@ -250,8 +250,9 @@ def _named(function, name: str) -> wp.Kernel:
 
 @wp.kernel
 def move(
-    box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
-    acceleration: wp.array(dtype=wp.vec3), new_density: wp.array(dtype=float),
+    box: Box, spacing: float, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
+    held: wp.array(dtype=int), acceleration: wp.array(dtype=wp.vec3),
+    new_density: wp.array(dtype=float),
     # outputs
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), density: wp.array(dtype=float),
 ):  # fmt: skip
@@ -264,7 +265,7 @@ def move(
         if held[i] == 0:
             v += h * acceleration[i]
         free = position[i] + h * v
-        x = contained(box, free)
+        x = contained(box, free, WALL_INSET * spacing)
         for axis in range(3):
             if x[axis] != free[axis] and box.lower_kind[axis] != PERIODIC:
                 v[axis] = 0.0

@@ -19,22 +19,27 @@ from ..order import CellOrder
 from . import kernels_warp as kernels
 
 NonNegative = Annotated[float, Field(ge=0)]
+Ratio = Annotated[float, Field(ge=1.0, le=3.0)]
 
 
 class ConfigSPH(Config):
-    smoothing_ratio: Annotated[float, Field(ge=1.0, le=3.0)] = Field(1.2, description="smoothing length h over spacing")
+    smoothing_ratio: Ratio = Field(1.2, description="smoothing length h over spacing, for liquids")
+    smoothing_ratio_solid: Ratio = Field(1.5, description="the same for materials with shear stiffness")
     cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
     viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
     force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
     density_diffusion: NonNegative = Field(0.1, description="delta of delta-SPH")
     artificial_viscosity: NonNegative = Field(0.02, description="alpha for liquids")
-    artificial_viscosity_solid: NonNegative = Field(0.1, description="alpha for materials with shear stiffness")
+    artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for materials with shear stiffness")
     artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.2, description="reach of the lists beyond the support, over h")
-    max_neighbours: Annotated[int, Field(ge=32, le=1024)] = Field(160, description="room in a particle's list")
+    max_neighbours: Annotated[int, Field(ge=32, le=1024)] = Field(256, description="room in a particle's list")
 
     def alpha(self, solid: bool) -> float:
         return self.artificial_viscosity_solid if solid else self.artificial_viscosity
+
+    def smoothing(self, solid: bool) -> float:
+        return self.smoothing_ratio_solid if solid else self.smoothing_ratio
 
 
 class SolverSPH(Solver):
@@ -47,12 +52,15 @@ class SolverSPH(Solver):
     passes = ("lists", "strain", "force", "move")
     faults: ClassVar = {FAULT_NEIGHBOURS: "a particle has more neighbours than numerics.sph.max_neighbours"}
 
+    typical_rate, typical_bytes = 4.0e5, 1400.0
+
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        h = config.smoothing_ratio * scenario.spacing
         c, m = scenario.wave_speed, scenario.material
+        solid = m.youngs_modulus is not None
+        h = config.smoothing(solid) * scenario.spacing
         # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1).
-        nu = m.viscosity / m.density + config.alpha(m.youngs_modulus is not None) * h * c / 10.0
+        nu = m.viscosity / m.density + config.alpha(solid) * h * c / 10.0
         g = float(np.linalg.norm(scenario.acceleration))
         a = config
         return [
@@ -75,7 +83,7 @@ class SolverSPH(Solver):
         self.scene, self.pool, self.config = scene, pool, config
         self.kernels = kernels.passes(scene.elastic, scene.viscous)
         self.num = kernels.Smoothing()
-        self.num.h = config.smoothing_ratio * scene.spacing
+        self.num.h = config.smoothing(scene.elastic) * scene.spacing
         self.num.spacing = scene.spacing
         self.num.sound_speed = scene.wave_speed
         self.num.density_diffusion = config.density_diffusion
@@ -144,7 +152,7 @@ class SolverSPH(Solver):
         wp.launch(
             kernels.move,
             pool.size,
-            [scene.box, pool.capacity, pool.count, scene.dt, pool.held, self.acceleration, self.new_density],
+            [scene.box, scene.spacing, pool.capacity, pool.count, scene.dt, pool.held, self.acceleration, self.new_density],
             [pool.position, pool.velocity, pool.density],
             device=scene.device,
         )

@@ -1,0 +1,5 @@
+"""python -m fluidbench."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,68 @@
+"""Beads and layers along the path that the nozzle took."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scenario import Scenario
+from .deposit import Deposit, Section, cut
+
+MIDDLE = (0.2, 0.8)  # share of the path over which a bead's averages are taken
+
+
+@dataclass(frozen=True)
+class Bead:
+    """Sections along one layer of the path; all arrays of shape (stations,)."""
+
+    station: np.ndarray  # distance along the path [m]
+    width: np.ndarray  # [m]
+    height: np.ndarray  # [m]
+    area: np.ndarray  # [m^2]
+    middle: Section
+
+    def _mean(self, values: np.ndarray) -> float:
+        share = self.station / self.station[-1]
+        return float(values[(share >= MIDDLE[0]) & (share <= MIDDLE[1])].mean())
+
+    def summary(self, layers: int) -> dict[str, float]:
+        """Averages over the middle 60 % of the path, per layer where that is meant."""
+        share = self.station / self.station[-1]
+        inner = self.area[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
+        return {
+            "bead_width_m": self._mean(self.width),
+            "bead_height_m": self._mean(self.height),
+            "bead_area_m2": self._mean(self.area) / layers,
+            "bead_continuity": float((inner > 0.5 * max(np.median(inner), 1e-30)).mean()),
+        }
+
+
+def measure_bead(deposit: Deposit, scenario: Scenario) -> Bead | None:
+    """Sections every spacing along the first layer's path; None without a moving nozzle."""
+    path, nozzle = scenario.toolpath, scenario.nozzle
+    if path is None or nozzle is None or path.speed == 0:
+        return None
+    corners = path.corners()
+    legs = np.diff(corners, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    knots = np.concatenate([[0.0], np.cumsum(lengths)])
+    count = int(np.clip(knots[-1] / deposit.spacing, 12, 160))
+    station = np.linspace(0.0, knots[-1], count)
+    leg = np.clip(np.searchsorted(knots, station, side="right") - 1, 0, len(legs) - 1)
+    points = np.stack([np.interp(station, knots, corners[:, i]) for i in range(2)], axis=1)
+    height = deposit.origin[2] + deposit.fill.shape[2] * deposit.spacing - scenario.domain.lower[2]
+    sections = [
+        cut(deposit, p, legs[i] / lengths[i], 2.5 * nozzle.diameter, height, scenario.domain.lower[2])
+        for p, i in zip(points, leg, strict=True)
+    ]
+    columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area"))
+    return Bead(station, *columns, middle=sections[count // 2])
+
+
+def layer_heights(position: np.ndarray, birth_time: np.ndarray, scenario: Scenario) -> list[float]:
+    """Rise of the mean height from each layer to the next [m]; empty for one layer."""
+    track = scenario.track
+    if track is None or scenario.toolpath is None or scenario.toolpath.layers < 2:
+        return []
+    layer = track.layer_at(birth_time - 1e-9)
+    mean = [position[layer == i, 2].mean() for i in range(scenario.toolpath.layers) if (layer == i).any()]
+    return [float(step) for step in np.diff(mean)]

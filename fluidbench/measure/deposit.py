@@ -1,0 +1,147 @@
+"""The one field from which all lengths come: the volume fraction of material on a regular grid."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scenario import Domain
+
+HALF = 0.5  # the surface of the deposit is where half of the space is filled
+FINE = 4  # sections are sampled this many times finer than the field
+
+
+@dataclass(frozen=True)
+class Deposit:
+    """Volume fraction `fill` (nx, ny, nz) in cells of edge `spacing` [m]; cell (0, 0, 0) is centred at `origin` [m].
+
+    A length read from it is known to about a quarter of `spacing`; a surface of curvature radius R is drawn inwards by
+    spacing^2 / (8 R), the blur of the quadratic spline.
+    """
+
+    origin: np.ndarray
+    spacing: float
+    fill: np.ndarray
+
+    @classmethod
+    def of(cls, position: np.ndarray, volume: np.ndarray, domain: Domain, spacing: float) -> "Deposit":
+        """Spread particles (n, 3) [m] of rest volume (n,) [m^3] over cells by quadratic splines, mirrored in walls."""
+        lower, upper = np.asarray(domain.lower), np.asarray(domain.upper)
+        cells = np.ceil((upper - lower) / spacing - 1e-6).astype(int)
+        if len(position) == 0:
+            return cls(lower + spacing / 2, spacing, np.zeros((3, 3, 3)))
+        place = (np.asarray(position, float) - lower) / spacing - 0.5
+        first = np.floor(place + 0.5).astype(int) - 1
+        start, stop = first.min(axis=0) - 2, first.max(axis=0) + 5
+        shape = stop - start
+        offset = place - first
+        weights = np.stack([0.5 * (1.5 - offset) ** 2, 0.75 - (offset - 1.0) ** 2, 0.5 * (offset - 0.5) ** 2])
+        flat = np.zeros(int(np.prod(shape)))
+        index = first - start
+        for i in range(3):
+            for j in range(3):
+                for k in range(3):
+                    cell = ((index[:, 0] + i) * shape[1] + index[:, 1] + j) * shape[2] + index[:, 2] + k
+                    flat += np.bincount(
+                        cell, weights[i, :, 0] * weights[j, :, 1] * weights[k, :, 2] * volume, minlength=flat.size
+                    )
+        fill, start = _folded(flat.reshape(shape) / spacing**3, start, cells)
+        return cls(lower + (start + 0.5) * spacing, spacing, fill)
+
+    def volume(self) -> float:
+        """Total volume [m^3]."""
+        return float(self.fill.sum() * self.spacing**3)
+
+    def sample(self, points: np.ndarray) -> np.ndarray:
+        """Fill at points of shape (..., 3) [m], trilinear; the outermost cells extend outwards."""
+        from scipy.ndimage import map_coordinates
+
+        place = (points - self.origin) / self.spacing
+        return map_coordinates(self.fill, np.moveaxis(place, -1, 0), order=1, mode="nearest")
+
+    def column_heights(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(x (nx,), y (ny,), height (nx, ny)) [m]: the material in each vertical column, as if it were solid."""
+        x = self.origin[0] + self.spacing * np.arange(self.fill.shape[0])
+        y = self.origin[1] + self.spacing * np.arange(self.fill.shape[1])
+        return x, y, self.fill.sum(axis=2) * self.spacing
+
+    def top(self, x: float | None = None, y: float | None = None, within: float = 0.0) -> float:
+        """Highest point of the surface [m], over the whole deposit or within a radius of a vertical axis; 0 if none."""
+        fill = self.fill
+        if x is not None and y is not None:
+            gx = self.origin[0] + self.spacing * np.arange(fill.shape[0])[:, None] - x
+            gy = self.origin[1] + self.spacing * np.arange(fill.shape[1])[None, :] - y
+            fill = np.where((np.hypot(gx, gy) <= within)[..., None], fill, 0.0)
+        profile = fill.max(axis=(0, 1))
+        filled = np.flatnonzero(profile >= HALF)
+        if len(filled) == 0:
+            return 0.0
+        k = filled[-1]
+        above = profile[k + 1] if k + 1 < len(profile) else 0.0
+        step = (profile[k] - HALF) / max(profile[k] - above, 1e-12)
+        return float(self.origin[2] + (k + min(step, 1.0)) * self.spacing)
+
+
+def _folded(fill: np.ndarray, start: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cells beyond the domain's faces folded back onto their mirror images, then cut off."""
+    start = start.copy()
+    for axis in range(3):
+        fill = np.moveaxis(fill, axis, 0)
+        behind = -start[axis]
+        if behind > 0:
+            ghost, fill = fill[:behind][::-1], fill[behind:].copy()
+            n = min(len(ghost), len(fill))
+            fill[:n] += ghost[:n]
+            start[axis] = 0
+        beyond = start[axis] + len(fill) - cells[axis]
+        if beyond > 0:
+            ghost, fill = fill[-beyond:][::-1], fill[:-beyond].copy()
+            n = min(len(ghost), len(fill))
+            fill[len(fill) - n :] += ghost[len(ghost) - n :]
+        fill = np.moveaxis(fill, 0, axis)
+    return fill, start
+
+
+@dataclass(frozen=True)
+class Section:
+    """A vertical cut: fill (across, up) on a fine grid; `across` and `up` are coordinates [m], up from the floor."""
+
+    across: np.ndarray
+    up: np.ndarray
+    fill: np.ndarray
+
+    @property
+    def solid(self) -> np.ndarray:
+        return self.fill >= HALF
+
+    @property
+    def area(self) -> float:
+        """Area of the cut [m^2]."""
+        return float(self.solid.sum() * (self.across[1] - self.across[0]) * (self.up[1] - self.up[0]))
+
+    @property
+    def width(self) -> float:
+        """Largest horizontal extent [m]."""
+        columns = np.flatnonzero(self.solid.any(axis=1))
+        return float((columns[-1] - columns[0] + 1) * (self.across[1] - self.across[0])) if len(columns) else 0.0
+
+    @property
+    def height(self) -> float:
+        """Highest point above the floor [m]."""
+        rows = np.flatnonzero(self.solid.any(axis=0))
+        return float((rows[-1] + 1) * (self.up[1] - self.up[0])) if len(rows) else 0.0
+
+
+def cut(deposit: Deposit, point: np.ndarray, direction: np.ndarray, reach: float, height: float, floor: float) -> Section:
+    """The section through `point` (x, y) square to `direction`, averaged over one cell along the path."""
+    step = deposit.spacing / FINE
+    normal = np.array([-direction[1], direction[0]])
+    across = np.arange(-reach, reach, step) + step / 2
+    up = np.arange(0.0, height, step) + step / 2
+    planes = []
+    for along in (-0.5, 0.0, 0.5):
+        centre = point + along * deposit.spacing * direction
+        points = np.empty((len(across), len(up), 3))
+        points[..., :2] = (centre + across[:, None] * normal)[:, None, :]
+        points[..., 2] = floor + up
+        planes.append(deposit.sample(points))
+    return Section(across, up, np.mean(planes, axis=0))

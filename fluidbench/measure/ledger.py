@@ -1,0 +1,53 @@
+"""One row of measures from one snapshot: the conservation ledger and the lengths that apply to the scenario."""
+
+import numpy as np
+
+from ..scenario import Scenario
+from .bead import layer_heights, measure_bead
+from .deposit import Deposit
+from .slump import measure_slump
+
+Frame = dict[str, np.ndarray]
+
+
+def deposit_of(frame: Frame, scenario: Scenario) -> Deposit:
+    """The deposited field of a snapshot, without what is still inside the nozzle."""
+    free = frame["held"] == 0
+    return Deposit.of(frame["position"][free], frame["volume"][free], scenario.domain, scenario.spacing)
+
+
+def ledger(frame: Frame, scenario: Scenario) -> dict[str, float]:
+    """Mass, momentum, energies and centre of mass of everything outside the nozzle, summed in float64."""
+    free = frame["held"] == 0
+    m = frame["mass"][free].astype(float)
+    x, v = frame["position"][free].astype(float), frame["velocity"][free].astype(float)
+    mass = float(m.sum())
+    row = {"particles": int(free.sum()), "mass_kg": mass}
+    row |= {f"momentum_{axis}_kg_m_s": float(m @ v[:, i]) for i, axis in enumerate("xyz")}
+    row["kinetic_energy_J"] = 0.5 * float(m @ (v * v).sum(axis=1))
+    row["potential_energy_J"] = -float((x @ scenario.acceleration) @ m)
+    row |= {f"center_{axis}_m": float(m @ x[:, i]) / mass if mass else 0.0 for i, axis in enumerate("xyz")}
+    return row
+
+
+def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
+    """Every length that the scenario calls for, all from the deposited field, with its resolution."""
+    deposit = deposit_of(frame, scenario)
+    row = {"resolution_m": deposit.spacing, "top_m": deposit.top() - scenario.domain.lower[2]}
+    row |= measure_slump(deposit, scenario)
+    return row
+
+
+def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
+    """`lengths` and what only the finished print shows: beads and layers."""
+    row = lengths(frame, scenario)
+    bead = measure_bead(deposit_of(frame, scenario), scenario)
+    if bead is not None and scenario.toolpath is not None:
+        row |= bead.summary(scenario.toolpath.layers)
+        free = frame["held"] == 0
+        for i, rise in enumerate(layer_heights(frame["position"][free], frame["birth_time"][free], scenario), 2):
+            row[f"layer_{i}_height_m"] = rise
+        if scenario.toolpath.kind == "ring" and scenario.toolpath.center is not None:
+            center = np.average(frame["position"][free, :2], axis=0, weights=frame["mass"][free])
+            row["ring_drift_m"] = float(np.hypot(*(center - scenario.toolpath.center)))
+    return row

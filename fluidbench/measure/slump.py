@@ -1,0 +1,49 @@
+"""Columns and fronts: how far what stood at the start has sunk and spread."""
+
+import numpy as np
+
+from ..scenario import Scenario
+from .deposit import Deposit
+
+
+def measure_slump(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
+    """Slump and spread of the first body, if it is a cylinder; front and height of it, if it is a box."""
+    if not scenario.bodies:
+        return {}
+    body, floor = scenario.bodies[0], scenario.domain.lower[2]
+    start = float(body.center[2] + body.extent[2]) - floor
+    if body.kind == "cylinder":
+        x, y = body.center[0], body.center[1]
+        top = deposit.top(x, y, within=0.25 * float(body.extent[0])) - floor
+        return {"slump": 1.0 - top / start, "spread_radius_m": spread_radius(deposit, x, y)}
+    if body.kind == "box":
+        return {"front_x_m": front(deposit) - scenario.domain.lower[0], "height_m": deposit.top() - floor}
+    return {}
+
+
+def front(deposit: Deposit) -> float:
+    """x at which the height averaged over y falls below one spacing [m] (validation section 0), to sub-cell accuracy."""
+    x, _, heights = deposit.column_heights()
+    return _falls_below(x, heights.mean(axis=1), deposit.spacing)
+
+
+def spread_radius(deposit: Deposit, x0: float, y0: float) -> float:
+    """Radius about an axis at which the azimuthally averaged height falls below one spacing [m]."""
+    x, y, heights = deposit.column_heights()
+    radius = np.hypot(x[:, None] - x0, y[None, :] - y0)
+    ring = np.rint(radius / deposit.spacing).astype(int)
+    count = np.maximum(np.bincount(ring.ravel()), 1)
+    mean = np.bincount(ring.ravel(), heights.ravel()) / count
+    return _falls_below(np.arange(len(mean)) * deposit.spacing, mean, deposit.spacing)
+
+
+def _falls_below(x: np.ndarray, values: np.ndarray, level: float) -> float:
+    """The last x at which `values` crosses `level` downwards, linear between samples; the first x if it never exceeds."""
+    above = np.flatnonzero(values >= level)
+    if len(above) == 0:
+        return float(x[0])
+    i = above[-1]
+    if i + 1 == len(x):
+        return float(x[i])
+    share = (values[i] - level) / max(values[i] - values[i + 1], 1e-30)
+    return float(x[i] + share * (x[i + 1] - x[i]))

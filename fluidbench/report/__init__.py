@@ -1,0 +1,1 @@
+"""What a comparison shows: traces (data), figures (files), html (one self-contained page)."""

@@ -1,0 +1,90 @@
+"""Tables for people: the same rows in the terminal and on the page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from statistics import mean, stdev
+from typing import Any
+
+from ..study.compare import Finished, binding
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of formatted cells under a head; the first column names the row."""
+
+    title: str
+    head: list[str]
+    rows: list[list[str]] = field(default_factory=list)
+    note: str = ""
+
+
+def number(value: float) -> str:
+    """Four significant digits."""
+    return f"{value:.4g}"
+
+
+def spread(values: Sequence[float]) -> str:
+    """A mean, with its standard deviation when there are several values."""
+    return number(mean(values)) if len(values) < 2 else f"{number(mean(values))} ± {stdev(values):.1g}"
+
+
+def by_method(results: Sequence[Finished]) -> dict[str, list[dict[str, Any]]]:
+    """Records of each method, in the order of the runs."""
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for result in results:
+        groups.setdefault(result.label, []).append(result.record)
+    return groups
+
+
+def fidelity(results: Sequence[Finished]) -> Table:
+    """Verdict and measures, one column a method; only completed runs have numbers."""
+    groups = by_method(results)
+    table = Table("Fidelity", ["", *groups])
+    table.rows.append(["verdict", *[", ".join(sorted({r["verdict"] for r in g})) for g in groups.values()]])
+    done = {name: [r for r in g if r["verdict"] == "completed"] for name, g in groups.items()}
+    hidden = ("momentum", "center", "potential", "particles")
+    keys = dict.fromkeys(k for g in done.values() for r in g for k in r["measures"] if not k.startswith(hidden))
+    for key in keys:
+        table.rows.append([label(key), *[spread([r["measures"][key] for r in g if key in r["measures"]] or [float("nan")])
+                                         if g else "-" for g in done.values()]])  # fmt: skip
+    return table
+
+
+def against_reference(results: Sequence[Finished]) -> Table | None:
+    """Measured value, reference and error of every answer; None when the scenario has none."""
+    table = Table("Against references", ["", "method", "measured", "reference", "error", "measure", "source"])
+    for result in results:
+        if result.record["repeat"] == 0:
+            for a in result.record.get("answers", []):
+                percent = not a["measure"].startswith(("absolute", "in discs"))
+                error = f"{100 * a['error']:.2f} %" if percent else f"{a['error']:.4f}"
+                table.rows.append([a["quantity"], result.label, number(a["measured"]), number(a["reference"]), error,
+                                   a["measure"], a["source"]])  # fmt: skip
+    return table if table.rows else None
+
+
+def costs(results: Sequence[Finished]) -> Table:
+    """What it cost, compilation apart."""
+    groups = {n: [r for r in g if "cost" in r] for n, g in by_method(results).items()}
+    table = Table("Cost (without compilation)", ["", *groups])
+    for key in (
+        "wall_s", "cpu_s", "wall_per_simulated_s", "simulated_to_real", "substeps", "mean_dt_s", "steps_per_s",
+        "particle_substeps_per_s", "particle_substeps_per_cpu_s", "peak_particles", "bytes_per_particle",
+        "peak_memory_MiB", "prepare_s",
+    ):  # fmt: skip
+        table.rows.append([label(key), *[spread([r["cost"][key] for r in g]) if g else "-" for g in groups.values()]])
+    table.rows.append(["binding bound", *[binding(g[0]) if g else "-" for g in groups.values()]])
+    return table
+
+
+UNITS = {"m": "m", "m2": "m²", "kg": "kg", "J": "J", "s": "s", "MiB": "MiB"}
+
+
+def label(key: str) -> str:
+    """'bead_width_m' -> 'bead width [m]'."""
+    words = key.split("_")
+    if words[-2:] == ["per", "s"] or words[-3:] == ["per", "cpu", "s"] or words[-3:] == ["per", "simulated", "s"]:
+        return " ".join(words)
+    if words[-1] in UNITS and len(words) > 1:
+        return f"{' '.join(words[:-1])} [{UNITS[words[-1]]}]"
+    return " ".join(words)

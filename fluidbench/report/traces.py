@@ -1,0 +1,146 @@
+"""What each plot shows, as plain data: drawn by figures.py into files and by html.py into the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..measure.bead import measure_bead
+from ..measure.ledger import deposit_of
+from ..measure.reference import table
+from ..scenario import Scenario
+from ..study.compare import Finished
+
+COLOURS = {"mpm": "#0072B2", "sph": "#D55E00", "pbd": "#009E73"}  # Okabe & Ito: distinct for colour-blind readers
+OTHERS = ("#CC79A7", "#E69F00", "#56B4E9", "#000000")
+
+
+def colour(label: str) -> str:
+    """A method's colour, the same in every plot."""
+    return COLOURS.get(label, OTHERS[sum(map(ord, label)) % len(OTHERS)])
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One line (or points, or bars) of a plot."""
+
+    label: str
+    x: list[Any]
+    y: list[float]
+    style: str = "line"
+    colour: str = "#000000"
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One plot: traces, axis titles with units, and whether both axes share a scale."""
+
+    name: str
+    title: str
+    x: str
+    y: str
+    traces: list[Trace] = field(default_factory=list)
+    equal: bool = False
+
+
+def load_frame(result: Finished) -> dict[str, np.ndarray]:
+    """The last snapshot of a run."""
+    with np.load(result.folder / "final.npz") as data:
+        return {key: data[key] for key in data.files if key != "time"}
+
+
+def plots(results: Sequence[Finished]) -> list[Plot]:
+    """Every plot that the scenario gives rise to; only completed runs appear."""
+    done = [r for r in results if r.ok and r.record["repeat"] == 0]
+    if not done:
+        return []
+    scenario = Scenario.model_validate(done[0].record["input"])
+    beads = _bead_plots(done, scenario) if scenario.toolpath is not None else []
+    return [p for p in [*beads, *_series_plots(done, scenario), *_cost_plots(results)] if p.traces]
+
+
+def _bead_plots(done: Sequence[Finished], scenario: Scenario) -> list[Plot]:
+    """Cross-sections over one another, width and height along the path."""
+    section = Plot("section", "cross-section at the middle of the path", "across the path [mm]", "height [mm]", equal=True)
+    width = Plot("width", "bead width along the path", "distance along the path [mm]", "width [mm]")
+    height = Plot("height", "bead height along the path", "distance along the path [mm]", "height [mm]")
+    for result in done:
+        bead = measure_bead(deposit_of(load_frame(result), scenario), scenario)
+        if bead is None:
+            continue
+        for i, outline in enumerate(outlines(bead.middle.across, bead.middle.up, bead.middle.fill)):
+            label = result.label if i == 0 else ""
+            xs, ys = (1e3 * outline).T.tolist()
+            section.traces.append(Trace(label, xs, ys, colour=colour(result.label)))
+        along = (1e3 * bead.station).tolist()
+        width.traces.append(Trace(result.label, along, (1e3 * bead.width).tolist(), colour=colour(result.label)))
+        height.traces.append(Trace(result.label, along, (1e3 * bead.height).tolist(), colour=colour(result.label)))
+    return [section, width, height]
+
+
+def outlines(across: np.ndarray, up: np.ndarray, fill: np.ndarray) -> list[np.ndarray]:
+    """Contours of half filling, longest first, each (n, 2) [m]."""
+    import contourpy
+
+    lines = contourpy.contour_generator(across, up, fill.T).lines(0.5)
+    return sorted((np.asarray(line) for line in lines if len(line) > 8), key=len, reverse=True)
+
+
+def _series_plots(done: Sequence[Finished], scenario: Scenario) -> list[Plot]:
+    """Measures over time, with the published points where there are some."""
+    import pandas as pd
+
+    wanted = {
+        "front_x_m": ("front", "front position", "front [m]"),
+        "slump": ("slump", "slump", "slump s' [-]"),
+        "top_m": ("top", "highest point of the deposit", "height [m]"),
+        "kinetic_energy_J": ("kinetic", "kinetic energy", "energy [J]"),
+    }
+    found = []
+    for column, (name, title, axis) in wanted.items():
+        plot = Plot(name, title, "time [s]", axis)
+        for result in done:
+            series = pd.read_parquet(result.folder / "series.parquet")
+            if column in series:
+                plot.traces.append(
+                    Trace(result.label, series["time_s"].tolist(), series[column].tolist(), colour=colour(result.label))
+                )
+        if column == "front_x_m" and scenario.reference == "martin_moyce_front" and plot.traces:
+            plot.traces.append(_martin_moyce(scenario))
+        found.append(plot)
+    return found
+
+
+def _martin_moyce(scenario: Scenario) -> Trace:
+    data = table("dam_break_martin_moyce_front_n2_2")
+    data = data[data["kind"] == "table"]
+    a = float(2.0 * scenario.bodies[0].extent[0])
+    clock = (data["T"] / np.sqrt(2.0 * 9.81 / a)).tolist()
+    return Trace("Martin & Moyce 1952 (gate clock)", clock, (a * data["Z"]).tolist(), style="points")
+
+
+def _cost_plots(results: Sequence[Finished]) -> list[Plot]:
+    """What each method cost; several repeats give several bars."""
+    bars = (
+        ("wall_per_simulated_s", "cost", "wall time per simulated second", "wall s / simulated s"),
+        ("particle_substeps_per_s", "throughput", "particle-substeps per second", "1 / s"),
+        ("mean_dt_s", "dt", "mean time step", "dt [s]"),
+    )
+    done = [r for r in results if r.ok]
+    found = []
+    for key, name, title, axis in bars:
+        plot = Plot(name, title, "", axis)
+        for result in done:
+            tag = result.label + (f" #{result.record['repeat'] + 1}" if result.record["repeat"] else "")
+            plot.traces.append(Trace(tag, [tag], [result.record["cost"][key]], "bar", colour(result.label)))
+        found.append(plot)
+    return found
+
+
+def run_files(results: Sequence[Finished], root: Path) -> list[tuple[str, str]]:
+    """(label, path relative to the report) of each run's record."""
+    return [(f"{r.label} #{r.record['repeat'] + 1}", (r.folder / "record.json").relative_to(root).as_posix()) for r in results]
