@@ -15,6 +15,7 @@ wp.set_module_options({"enable_backward": False})
 INDEX_BITS = wp.constant(26)
 INDEX_MASK = wp.constant(2**26 - 1)
 FAULT_NEIGHBOURS = 4
+ROOM = 1.7  # how much denser than a lattice matter may get before its lists overflow
 WALL_INSET = wp.constant(0.2)  # closest approach to a wall, in particle spacings; at rest the first layer is at 0.5
 
 
@@ -113,19 +114,37 @@ def mark_worlds(capacity: int, worlds: int, count: wp.array(dtype=int), group: w
 
 
 @wp.func
-def append(
-    grid: wp.uint64, world: int, i: int, at: wp.vec3, code: int, reach: float, position: wp.array(dtype=wp.vec3),
-    limit: int, found: int, row: int, column: int, entries: wp.array(dtype=int),
-):  # fmt: skip
-    """Add the particles within reach of `at` to the list of i; returns how many there are now."""
-    n = found
-    query = wp.hash_grid_query(grid, at, reach, world)
-    for j in query:
-        if wp.length_sq(position[j] - at) < reach * reach and (j != i or code > 0):
-            if n < limit:
-                entries[i * row + n * column] = j + (code << INDEX_BITS)
-            n += 1
-    return n
+def near_faces(box: Box, x: wp.vec3, reach: float, periodic: bool):
+    """Per axis, bits 1 and 2 for the lower and upper face whose images (periodic, or mirrored) may come within reach;
+    bit 4, always set, for no image."""
+    near = wp.vec3i(4, 4, 4)
+    for axis in range(3):
+        if (box.lower_kind[axis] == PERIODIC) == periodic:
+            if x[axis] - box.lower[axis] < reach:
+                near[axis] = near[axis] + 1
+            if box.upper[axis] - x[axis] < reach:
+                near[axis] = near[axis] + 2
+    return near
+
+
+@wp.func
+def has_choice(near: wp.vec3i, code: int):
+    """Whether all of the faces that a code uses are near."""
+    zero = (code % 3 == 0) or (near[0] & (code % 3)) != 0
+    one = ((code / 3) % 3 == 0) or (near[1] & ((code / 3) % 3)) != 0
+    two = (code / 9 == 0) or (near[2] & (code / 9)) != 0
+    return zero and one and two
+
+
+@wp.func
+def opposite(code: int):
+    """The code that undoes a periodic shift."""
+    back = int(0)
+    power = int(1)
+    for axis in range(3):
+        back += ((3 - image_code(code, axis)) % 3) * power
+        power *= 3
+    return back
 
 
 @wp.kernel
@@ -136,39 +155,49 @@ def fill_lists(
     entries: wp.array(dtype=int), number: wp.array(dtype=int), listed: wp.array(dtype=wp.vec3),
     fault: wp.array(dtype=int), outdated: wp.array(dtype=int),
 ):  # fmt: skip
-    """All neighbours within reach, images included."""
+    """All neighbours within reach, images included.
+
+    Periodic images are found by asking the grid at the shifted place. Mirror images need no search: a particle is
+    never farther away than its image, so they are among the particles just found, or the particle itself.
+    """
     i = wp.tid()
     world = group[i]
     n = int(0)
     if world < worlds:
         x = position[i]
         listed[i] = x
-        n = append(grid, world, i, x, 0, reach, position, limit, n, row, column, entries)
-        near = wp.vec3i(0, 0, 0)
-        for axis in range(3):
-            if x[axis] - box.lower[axis] < reach:
-                near[axis] = near[axis] + 1
-            if box.upper[axis] - x[axis] < reach:
-                near[axis] = near[axis] + 2
-        if near[0] + near[1] + near[2] > 0:
-            for code in range(1, 27):
-                wanted = bool(True)
-                undo = int(0)
-                power = int(1)
-                for axis in range(3):
-                    c = image_code(code, axis)
-                    wanted = wanted and (c == 0 or (near[axis] & c) != 0)
-                    if c > 0 and box.lower_kind[axis] == PERIODIC:
-                        c = 3 - c  # the query goes to where the shift comes from
-                    undo += c * power
-                    power *= 3
-                if wanted:
-                    # |x - image(y)| = |image^-1(x) - y|; the images within reach of x lie beyond the near face,
-                    # and a periodic one comes from the far side.
-                    n = append(
-                        grid, world, i, image_position(box, x, code), undo, reach, position, limit, n, row, column,
-                        entries,
-                    )  # fmt: skip
+        reach2 = reach * reach
+        shifts = near_faces(box, x, reach, True)
+        mirrors = near_faces(box, x, reach, False)
+        most_shifts, most_mirrors = int(1), int(1)
+        if shifts[0] + shifts[1] + shifts[2] > 12:
+            most_shifts = 27
+        if mirrors[0] + mirrors[1] + mirrors[2] > 12:
+            most_mirrors = 27
+        for shift in range(most_shifts):
+            if has_choice(shifts, shift):
+                first = n
+                at = image_position(box, x, opposite(shift))
+                query = wp.hash_grid_query(grid, at, reach, world)
+                for j in query:
+                    if wp.length_sq(position[j] - at) < reach2 and (j != i or shift > 0):
+                        if n < limit:
+                            entries[i * row + n * column] = j + (shift << INDEX_BITS)
+                        n += 1
+                last = wp.min(n, limit)
+                for face in range(1, most_mirrors):
+                    if has_choice(mirrors, face):
+                        code = shift + face
+                        if shift == 0 and wp.length_sq(image_position(box, x, code) - x) < reach2:
+                            if n < limit:
+                                entries[i * row + n * column] = i + (code << INDEX_BITS)
+                            n += 1
+                        for k in range(first, last):
+                            j = entries[i * row + k * column] & INDEX_MASK
+                            if wp.length_sq(image_position(box, position[j], code) - x) < reach2:
+                                if n < limit:
+                                    entries[i * row + n * column] = j + (code << INDEX_BITS)
+                                n += 1
         if n > limit:
             wp.atomic_or(fault, 0, FAULT_NEIGHBOURS)
             n = limit
@@ -180,8 +209,9 @@ def fill_lists(
 class Neighbours:
     """Lists of all pairs within `radius`, valid while nothing has moved more than half of `skin` (both [m])."""
 
-    def __init__(self, scene: Scene, pool: Pool, radius: float, skin: float, limit: int) -> None:
-        self.scene, self.pool, self.limit = scene, pool, limit
+    def __init__(self, scene: Scene, pool: Pool, radius: float, skin: float) -> None:
+        self.scene, self.pool = scene, pool
+        self.limit = limit = room((radius + skin) / scene.spacing)
         self.reach, self.half_skin2 = radius + skin, (0.5 * skin) ** 2
         # On the CPU a particle's list is contiguous; on a GPU the k-th entries of neighbouring threads are.
         self.row, self.column = (limit, 1) if scene.device.is_cpu else (1, pool.size)
@@ -225,6 +255,11 @@ class Neighbours:
 
     def footprint(self) -> dict[str, int]:
         return {"neighbour lists": self.entries.capacity + self.number.capacity + self.listed.capacity}
+
+
+def room(reach_ratio: float) -> int:
+    """Entries to allow for: 1.7 times those of a lattice. Odd multiples of 8, lest rows collide in the cache."""
+    return 16 * int(np.ceil(ROOM * 4.0 / 3.0 * np.pi * reach_ratio**3 / 16.0)) + 8
 
 
 def _grid_shape(particles: int) -> tuple[int, int, int]:

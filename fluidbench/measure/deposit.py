@@ -1,6 +1,7 @@
 """The one field from which all lengths come: the volume fraction of material on a regular grid."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,8 +15,8 @@ FINE = 4  # sections are sampled this many times finer than the field
 class Deposit:
     """Volume fraction `fill` (nx, ny, nz) in cells of edge `spacing` [m]; cell (0, 0, 0) is centred at `origin` [m].
 
-    A length read from it is known to about a quarter of `spacing`; a surface of curvature radius R is drawn inwards by
-    spacing^2 / (8 R), the blur of the quadratic spline.
+    A length read from it is known to about a quarter of `spacing`; the spline's blur draws a surface of curvature
+    radius R inwards by spacing^2 / (8 R).
     """
 
     origin: np.ndarray
@@ -51,12 +52,18 @@ class Deposit:
         """Total volume [m^3]."""
         return float(self.fill.sum() * self.spacing**3)
 
+    @cached_property
+    def _spline(self) -> np.ndarray:
+        from scipy.ndimage import spline_filter
+
+        return spline_filter(self.fill, order=3, mode="nearest")
+
     def sample(self, points: np.ndarray) -> np.ndarray:
-        """Fill at points of shape (..., 3) [m], trilinear; the outermost cells extend outwards."""
+        """Fill at points of shape (..., 3) [m] by a cubic spline through the cells; the outermost extend outwards."""
         from scipy.ndimage import map_coordinates
 
-        place = (points - self.origin) / self.spacing
-        return map_coordinates(self.fill, np.moveaxis(place, -1, 0), order=1, mode="nearest")
+        place = np.moveaxis((points - self.origin) / self.spacing, -1, 0)
+        return map_coordinates(self._spline, place, order=3, mode="nearest", prefilter=False)
 
     def column_heights(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(x (nx,), y (ny,), height (nx, ny)) [m]: the material in each vertical column, as if it were solid."""
@@ -109,9 +116,12 @@ class Section:
     up: np.ndarray
     fill: np.ndarray
 
-    @property
+    @cached_property
     def solid(self) -> np.ndarray:
-        return self.fill >= HALF
+        """What the outer contour encloses; holes finer than the field's resolution are noise."""
+        from scipy.ndimage import binary_fill_holes
+
+        return np.asarray(binary_fill_holes(self.fill >= HALF))
 
     @property
     def area(self) -> float:
@@ -132,13 +142,13 @@ class Section:
 
 
 def cut(deposit: Deposit, point: np.ndarray, direction: np.ndarray, reach: float, height: float, floor: float) -> Section:
-    """The section through `point` (x, y) square to `direction`, averaged over one cell along the path."""
+    """The section through `point` (x, y) square to `direction`, averaged over three cells along the path."""
     step = deposit.spacing / FINE
     normal = np.array([-direction[1], direction[0]])
     across = np.arange(-reach, reach, step) + step / 2
     up = np.arange(0.0, height, step) + step / 2
     planes = []
-    for along in (-0.5, 0.0, 0.5):
+    for along in (-1.5, -0.75, 0.0, 0.75, 1.5):
         centre = point + along * deposit.spacing * direction
         points = np.empty((len(across), len(up), 3))
         points[..., :2] = (centre + across[:, None] * normal)[:, None, :]

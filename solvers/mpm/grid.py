@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from fluidbench.errors import UserError
-from fluidbench.scene import PERIODIC, Scene
+from fluidbench.scene import Scene
 
 FIRST = 4  # node index of the lower walls: one block of ghost nodes lies behind them
 FAULT_BLOCKS = 1
@@ -119,7 +119,3 @@ def raw_node(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int),
     if slot >= 0:
         value = raw[slot * 64 + ((node[0] & 3) << 4) + ((node[1] & 3) << 2) + (node[2] & 3)]
     return value
-
-
-def is_walled(kind: int) -> bool:
-    return kind != PERIODIC

@@ -20,6 +20,8 @@ pressure = warp_func(constitutive.pressure)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
+# Filling of a wall's node that a flat surface gives at gaps of 0.36 and 0.21 dx: contact grows between them.
+CONTACT_BEGINS, CONTACT_ENDS = wp.constant(0.5), wp.constant(0.7)
 
 
 @wp.kernel
@@ -151,6 +153,32 @@ def p2g(
 
 
 @wp.func
+def grip(
+    grid: Grid, world: int, node: wp.vec3i, axis: int, rest_density: float, table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4),
+):  # fmt: skip
+    """How far, from 0 to 1, the wall nearest to a node on this axis acts on its column of nodes.
+
+    Slip walls always act: they are symmetry planes. Rough walls act where material has arrived, as the node on the
+    wall fills from CONTACT_BEGINS to CONTACT_ENDS; otherwise a falling body would be stopped, and squeezed, up to
+    1.5 dx above the floor (Nairn 2013, CMES 92:271, on contact by separation instead of by velocity).
+    """
+    plane = node
+    kind = grid.lower_kind[axis]
+    plane[axis] = FIRST
+    if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
+        kind = grid.upper_kind[axis]
+        plane[axis] = FIRST + grid.cells[axis]
+    hold = float(1.0)
+    if kind == PERIODIC:
+        hold = 0.0
+    elif kind == STICK or kind == FRICTION:
+        filled = 2.0 * raw_node(grid, world, plane, table, raw)[3] * grid.inv_dx * grid.inv_dx * grid.inv_dx
+        hold = wp.clamp((filled / rest_density - CONTACT_BEGINS) / (CONTACT_ENDS - CONTACT_BEGINS), 0.0, 1.0)
+    return hold
+
+
+@wp.func
 def mirror(node: int, cells: int, lower_kind: int, upper_kind: int):
     """The node in front of a mirroring wall (slip, stick) whose image this node is; itself elsewhere."""
     inside = node
@@ -205,13 +233,13 @@ def rub(v: wp.vec3, axis: int, outward: float, friction: float):
 
 
 @wp.func
-def wall_velocity(grid: Grid, node: wp.vec3i, v: wp.vec3):
+def wall_velocity(grid: Grid, node: wp.vec3i, touching: wp.vec3i, v: wp.vec3):
     """Impose the walls on the velocity of a node on, or behind, them."""
     out = v
     for axis in range(3):
         i, last = node[axis], FIRST + grid.cells[axis]
         lower, upper = grid.lower_kind[axis], grid.upper_kind[axis]
-        if lower != PERIODIC and (i <= FIRST or i >= last):
+        if touching[axis] == 1 and (i <= FIRST or i >= last):
             kind = lower
             friction = grid.lower_friction[axis]
             outward = float(-1.0)
@@ -229,12 +257,16 @@ def wall_velocity(grid: Grid, node: wp.vec3i, v: wp.vec3):
 
 
 @wp.func
-def folded(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)):
+def folded(
+    grid: Grid, world: int, node: wp.vec3i, touching: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)
+):
     """Momentum and mass of a node in front of mirroring walls, with what was scattered behind them folded back."""
     total = wp.vec4(0.0, 0.0, 0.0, 0.0)
     other = wp.vec3i(0, 0, 0)
     for axis in range(3):
-        other[axis] = image(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
+        other[axis] = node[axis]
+        if touching[axis] == 1:
+            other[axis] = image(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
     for combination in range(8):
         at = node
         valid = bool(True)
@@ -263,14 +295,35 @@ def near_wall(grid: Grid, node: wp.vec3i):
     return near
 
 
+@wp.func
+def plane_share(grid: Grid, node: wp.vec3i):
+    """What the mass of a node on a wall must be multiplied by: only half (a quarter, ...) of its cell is inside."""
+    share = float(1.0)
+    for axis in range(3):
+        walled = grid.lower_kind[axis] != PERIODIC
+        if walled and (node[axis] == FIRST or node[axis] == FIRST + grid.cells[axis]):
+            share *= 2.0
+    return share
+
+
+@wp.func
+def unbound(raw: wp.vec4, gain: wp.vec3, density: float):
+    """A node's velocity and density where no wall acts."""
+    free = wp.vec4(0.0, 0.0, 0.0, density)
+    if raw[3] > 0.0:
+        free = wp.vec4(raw[0] / raw[3] + gain[0], raw[1] / raw[3] + gain[1], raw[2] / raw[3] + gain[2], density)
+    return free
+
+
 @wp.kernel
 def grid_step(
     grid: Grid, lanes: int, active: wp.array(dtype=int), block_of: wp.array(dtype=int), table: wp.array(dtype=int),
     raw: wp.array(dtype=wp.vec4), dt: wp.array(dtype=float), gravity: wp.array(dtype=wp.vec3),
+    phases: wp.array2d(dtype=Phase),
     # outputs
     moving: wp.array(dtype=wp.vec4),
 ):  # fmt: skip
-    """Velocity of every node from momentum, gravity and walls; the fourth component is the node's mass.
+    """Velocity of every node from momentum, gravity and walls; the fourth component is its density [kg/m^3].
 
     Ghost nodes behind a mirroring wall get the mirrored velocity of their partner, so that the gather sees a true
     mirror: zeroing them instead costs energy at every step.
@@ -284,21 +337,33 @@ def grid_step(
         total = raw[t]
         wall = near_wall(grid, node)
         inside = node
+        touching = wp.vec3i(0, 0, 0)
+        hold = float(1.0)
         if wall:
             for axis in range(3):
-                inside[axis] = mirror(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
-            total = folded(grid, world, inside, table, raw)
+                near = node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
+                held = grip(grid, world, node, axis, phases[world, 0].density, table, raw)
+                if near and held > 0.0:
+                    hold = wp.min(hold, held)
+                    touching[axis] = 1
+                    inside[axis] = mirror(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
+            total = folded(grid, world, inside, touching, table, raw)
         result = wp.vec4(0.0, 0.0, 0.0, 0.0)
         if total[3] > 0.0:
             v = wp.vec3(total[0], total[1], total[2]) / total[3] + dt[world] * gravity[world]
             if wall:
-                v = wall_velocity(grid, inside, v)
-            result = wp.vec4(v[0], v[1], v[2], total[3])
+                v = wall_velocity(grid, inside, touching, v)
+            density = total[3] * grid.inv_dx * grid.inv_dx * grid.inv_dx
+            if wall:
+                density *= plane_share(grid, inside)
+            result = wp.vec4(v[0], v[1], v[2], density)
             if wall:
                 for axis in range(3):
                     if inside[axis] != node[axis]:
                         kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
                         result = flipped(result, axis, kind)
+            if hold < 1.0:
+                result = hold * result + (1.0 - hold) * unbound(raw[t], dt[world] * gravity[world], result[3])
         moving[t] = result
         t += lanes
 
@@ -320,12 +385,21 @@ def contained(grid: Grid, x: wp.vec3):
     return out
 
 
+@wp.struct
+class Feedback:
+    """How the density on the grid corrects the volume ratio that particles integrate, and so drifts."""
+
+    rate: float  # [1/s]
+    tolerance: float  # overlap that is left alone [-]
+
+
 @wp.kernel
 def g2p(
     grid: Grid, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), moving: wp.array(dtype=wp.vec4),
-    held: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int), feedback: Feedback,
     # outputs
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), affine: wp.array(dtype=wp.mat33),
+    volume_ratio: wp.array(dtype=float),
     table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), fault: wp.array(dtype=int),
 ):  # fmt: skip
     """Velocity and affine velocity field of each particle from its 27 nodes (Jiang et al. 2015), then its motion."""
@@ -344,6 +418,7 @@ def g2p(
             bx, by, bz, lx, ly, lz = node_parts(grid, base)
             start = world * grid.blocks_per_world
             v = wp.vec3(0.0, 0.0, 0.0)
+            density = float(0.0)
             cx, cy, cz = wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0)
             for o in range(3):
                 vx = wp.vec3(0.0, 0.0, 0.0)
@@ -353,6 +428,7 @@ def g2p(
                         slot = wp.max(table[start + bx[o] + by[q] + bz[r]] - 1, 0)
                         node = moving[slot * 64 + lx[o] + ly[q] + lz[r]]
                         u = wz[r] * wp.vec3(node[0], node[1], node[2])
+                        density += wx[o] * wy[q] * wz[r] * node[3]
                         vy += u
                         cz += (wx[o] * wy[q] * (float(r) - f[2])) * u
                     vx += wy[q] * vy
@@ -361,8 +437,18 @@ def g2p(
                 cx += (wx[o] * (float(o) - f[0])) * vx
             affine[p] = (4.0 * grid.inv_dx) * wp.matrix_from_cols(cx, cy, cz)
             velocity[p] = v
-        x = contained(grid, x + dt[world] * v)
+            j = volume_ratio[p]
+            crowding = j * density / phases[world, phase_of[p]].density - 1.0 - feedback.tolerance
+            if crowding > 0.0:
+                volume_ratio[p] = j * (1.0 - wp.min(dt[world] * feedback.rate * crowding, 0.1))
+        free = x + dt[world] * v
+        x = contained(grid, free)
         position[p] = x
+        for axis in range(3):
+            if x[axis] != free[axis] and grid.wrap[axis] == 0:
+                stopped = velocity[p]
+                stopped[axis] = 0.0
+                velocity[p] = stopped
         after = first_node(grid, x)
         if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
             activate_stencil(grid, world, after, table, block_of, active, fault)

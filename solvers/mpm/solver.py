@@ -25,6 +25,10 @@ class ConfigMPM(Config):
     grid_ratio: Annotated[float, Field(ge=1.0, le=4.0)] = Field(2.0, description="grid spacing over particle spacing")
     safety: Annotated[float, Field(gt=0, le=1.0)] = Field(0.8, description="share of the exact stability limit used")
     advection: Annotated[float, Field(gt=0, lt=1.0)] = Field(0.5, description="cells that matter may cross in a step")
+    volume_feedback: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.1, description="rate, in c / dx, at which overlap seen on the grid corrects the integrated volume"
+    )
+    volume_tolerance: Annotated[float, Field(ge=0)] = Field(0.0, description="overlap that is left alone")
     blocks_per_particle: Annotated[float, Field(gt=0, le=8)] = Field(0.5, description="grid blocks to preallocate")
 
 
@@ -78,6 +82,9 @@ class SolverMPM(Solver):
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
         self.scene, self.pool, self.config = scene, pool, config
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
+        self.feedback = kernels.Feedback()
+        self.feedback.rate = config.volume_feedback * scene.wave_speed / self.grid.dx
+        self.feedback.tolerance = config.volume_tolerance
         blocks = self.grid.blocks_per_world * scene.worlds
         slots = min(blocks, 512 + int(config.blocks_per_particle * pool.size))
         pool.add_field("affine", wp.mat33)
@@ -128,7 +135,7 @@ class SolverMPM(Solver):
             kernels.grid_step,
             self.node_lanes,
             [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.scene.dt,
-             self.scene.gravity],
+             self.scene.gravity, self.scene.phases],
             [self.moving],
             device=self.scene.device,
         )  # fmt: skip
@@ -138,8 +145,9 @@ class SolverMPM(Solver):
         wp.launch(
             kernels.g2p,
             pool.size,
-            [self.grid, pool.capacity, pool.count, self.scene.dt, self.moving, pool.held],
-            [pool.position, pool.velocity, pool.affine, self.table, self.block_of, self.active, pool.fault],
+            [self.grid, pool.capacity, pool.count, self.scene.dt, self.moving, self.scene.phases, pool.phase, pool.held,
+             self.feedback],
+            [pool.position, pool.velocity, pool.affine, pool.volume_ratio, self.table, self.block_of, self.active, pool.fault],
             device=self.scene.device,
         )
 

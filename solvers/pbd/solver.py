@@ -27,7 +27,6 @@ class ConfigPBD(Config):
     over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
     shear_sweeps: Annotated[int, Field(ge=1, le=64)] = Field(4, description="XSPH sweeps per substep")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
-    max_neighbours: Annotated[int, Field(ge=32, le=1024)] = Field(160, description="room in a particle's list")
 
 
 def largest_viscosity(scenario: Scenario, config: ConfigPBD, dt: float) -> float:
@@ -43,7 +42,7 @@ class SolverPBD(Solver):
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
     features = frozenset({Feature.VISCOSITY, Feature.FRICTION, Feature.PERIODIC})
     Config: ClassVar = ConfigPBD
-    faults: ClassVar = {FAULT_NEIGHBOURS: "a particle has more neighbours than numerics.pbd.max_neighbours"}
+    faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
     passes = ("predict", "lists", "multipliers", "correct", "apply", "velocities", "shear", "rub")
 
     typical_rate, typical_bytes = 1.2e5, 900.0
@@ -84,7 +83,7 @@ class SolverPBD(Solver):
             self.smoothed = wp.zeros(pool.size, dtype=wp.vec3)
             self.multiplier = wp.zeros(pool.size, dtype=float)
             self.fill = wp.ones(pool.size, dtype=float)
-        self.neighbours = Neighbours(scene, pool, self.num.support, config.skin * scene.spacing, config.max_neighbours)
+        self.neighbours = Neighbours(scene, pool, self.num.support, config.skin * scene.spacing)
         self.pairs = kernels.Lists()
         self.pairs.entries, self.pairs.number = self.neighbours.entries, self.neighbours.number
         self.pairs.row, self.pairs.column = self.neighbours.row, self.neighbours.column

@@ -70,6 +70,23 @@ def mirrored_shear(box: Box, s: wp.vec3, code: int):
     return out
 
 
+@wp.kernel
+def level(
+    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), gravity: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3), phase_of: wp.array(dtype=int), density: wp.array(dtype=float),
+    # outputs
+    dynamic_density: wp.array(dtype=float),
+):  # fmt: skip
+    """Density without what hydrostatic equilibrium adds along gravity, so that diffusion does not level that too
+    (Fourtakas et al. 2019, Comput. Fluids 190:346)."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        phase = phases[world, phase_of[i]]
+        layering = (phase.density * phase.density / phase.bulk_modulus) * wp.dot(gravity[world], position[i])
+        dynamic_density[i] = density[i] - phase.density - layering
+
+
 @functools.cache
 def passes(strength: bool, viscous: bool) -> SimpleNamespace:
     """The passes for materials with or without shear stiffness and Newtonian viscosity: unused physics costs nothing."""
@@ -77,14 +94,15 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
 
     def strain(
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-        phases: wp.array2d(dtype=Phase), gravity: wp.array(dtype=wp.vec3), position: wp.array(dtype=wp.vec3),
-        velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), phase_of: wp.array(dtype=int),
-        held: wp.array(dtype=int), density: wp.array(dtype=float),
+        phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
+        position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
+        density: wp.array(dtype=float), dynamic_density: wp.array(dtype=float),
         # outputs
         elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-        new_density: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3),
+        new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3),
         stress_shear: wp.array(dtype=wp.vec3),
     ):  # fmt: skip
+        """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law."""
         i = wp.tid()
         world = i / capacity
         if i - world * capacity < count[world]:
@@ -92,11 +110,9 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             x = position[i]
             v = velocity[i]
             rho = density[i]
+            dynamic = dynamic_density[i]
             inv_h = 1.0 / num.h
-            # density that hydrostatic equilibrium adds per metre along gravity, kept out of the diffusion
-            # (Fourtakas et al. 2019, Comput. Fluids 190:346)
-            layering = (phase.density * phase.density / phase.bulk_modulus) * gravity[world]
-            divergence = float(0.0)
+            inflow = float(0.0)
             spread = float(0.0)
             gradient = wp.mat33()
             moment = wp.mat33()
@@ -111,28 +127,23 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     xj = image_position(box, xj, code)
                     vj = image_velocity(box, vj, code)
                 r = x - xj
-                r2 = wp.dot(r, r)
-                f = slope(wp.sqrt(r2) * inv_h, num.h)
-                rho_j = density[j]
-                vol = mass[j] / rho_j
-                w = vol * f
                 u = v - vj
-                divergence -= w * wp.dot(u, r)
-                spread -= w * (rho_j - rho + wp.dot(layering, r))
+                w = mass[j] * slope(wp.sqrt(wp.dot(r, r)) * inv_h, num.h)
+                inflow += w * wp.dot(u, r)
+                spread += w * (dynamic - dynamic_density[j])
                 if wp.static(strength):
                     gradient -= wp.outer(w * u, r)
                     moment -= wp.outer(w * r, r)
             if wp.static(strength):
                 # density from the corrected gradient, too: the same strain for pressure and for shear
-                gradient = gradient * symmetric_inverse(moment)
-                divergence = wp.trace(gradient)
+                gradient = gradient * symmetric_inverse(moment / rho) / rho
+                inflow = -rho * wp.trace(gradient)
             h = dt[world]
-            rate = -rho * divergence + 2.0 * num.density_diffusion * num.h * num.sound_speed * spread
+            rate = inflow + 2.0 * num.density_diffusion * num.h * num.sound_speed * spread / rho
             rho = wp.max(rho + h * rate, 0.1 * phase.density)
             new_density[i] = rho
             p = pressure(rho / phase.density - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
             scale = 1.0 / (rho * rho)
-            normal = wp.vec3(-p, -p, -p)
             if wp.static(strength):
                 b = elastic_normal[i]
                 s = elastic_shear[i]
@@ -149,15 +160,19 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     elastic_shear[i] = s
                 g = phase.shear_modulus * rho / phase.density  # Cauchy from Kirchhoff: divide by J
                 mean = (b[0] + b[1] + b[2]) / 3.0
-                normal += g * (b - wp.vec3(mean, mean, mean))
+                mean += p / g
+                normal = g * (b - wp.vec3(mean, mean, mean))
                 stress_shear[i] = (scale * g) * s
-            stress_normal[i] = scale * normal
+                stress_normal[i] = scale * normal
+            else:
+                load[i] = scale * p
 
     def force(
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-        phases: wp.array2d(dtype=Phase), gravity: wp.array(dtype=wp.vec3), position: wp.array(dtype=wp.vec3),
-        velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), phase_of: wp.array(dtype=int),
-        density: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3), stress_shear: wp.array(dtype=wp.vec3),
+        phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), gravity: wp.array(dtype=wp.vec3),
+        position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
+        density: wp.array(dtype=float), load: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3),
+        stress_shear: wp.array(dtype=wp.vec3),
         # outputs
         acceleration: wp.array(dtype=wp.vec3),
     ):  # fmt: skip
@@ -168,12 +183,14 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             x = position[i]
             v = velocity[i]
             rho = density[i]
-            sn = stress_normal[i]
-            ss = wp.vec3(0.0, 0.0, 0.0)
+            own = load[i]
+            sn, ss = wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0)
             if wp.static(strength):
+                sn = stress_normal[i]
                 ss = stress_shear[i]
             inv_h = 1.0 / num.h
-            shock = num.artificial_viscosity * num.h * num.sound_speed
+            tiny = 0.01 * num.h * num.h
+            shock = num.artificial_viscosity * num.h * num.sound_speed / rho
             inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
             a = wp.vec3(0.0, 0.0, 0.0)
             wall = wp.vec3(0.0, 0.0, 0.0)
@@ -188,31 +205,35 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     xj = image_position(box, xj, code)
                     vj = image_velocity(box, vj, code)
                 r = x - xj
+                u = v - vj
                 r2 = wp.dot(r, r)
                 q = wp.sqrt(r2) * inv_h
                 f = mass[j] * slope(q, num.h)
-                u = v - vj
                 ur = wp.dot(u, r)
                 # artificial viscosity, for approaching particles (Monaghan 1992)
-                scalar = shock * wp.min(ur, 0.0) / ((r2 + 0.01 * num.h * num.h) * rho)
+                scalar = shock * wp.min(ur, 0.0) / (r2 + tiny)
                 if wp.static(viscous):
                     # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
-                    scalar += 10.0 * phase.viscosity * ur / ((r2 + 1.0e-4 * num.h * num.h) * rho * density[j])
-                n = sn + stress_normal[j]
-                push = wp.vec3(n[0] * r[0], n[1] * r[1], n[2] * r[2])
+                    scalar += 10.0 * phase.viscosity * ur / ((r2 + 0.01 * tiny) * rho * density[j])
+                push = wp.vec3(0.0, 0.0, 0.0)
                 if wp.static(strength):
-                    sj = stress_shear[j]
+                    n = sn + stress_normal[j]
+                    t = stress_shear[j]
                     if code > 0:
-                        sj = mirrored_shear(box, sj, code)
-                    t = ss + sj
-                    push += wp.vec3(
-                        t[0] * r[1] + t[1] * r[2], t[0] * r[0] + t[2] * r[2], t[1] * r[0] + t[2] * r[1]
+                        t = mirrored_shear(box, t, code)
+                    t = ss + t
+                    push = wp.vec3(
+                        n[0] * r[0] + t[0] * r[1] + t[1] * r[2],
+                        n[1] * r[1] + t[0] * r[0] + t[2] * r[2],
+                        n[2] * r[2] + t[1] * r[0] + t[2] * r[1],
                     )
                     # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
                     tension = wp.max(n[0] + n[1] + n[2], 0.0) / 3.0
                     if tension > 0.0:
                         ratio = kernel(q, num.h) * inv_w
                         scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio
+                else:
+                    scalar -= own + load[j]
                 push = f * (push + scalar * r)
                 if code > 0:
                     for axis in range(3):

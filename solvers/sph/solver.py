@@ -32,8 +32,7 @@ class ConfigSPH(Config):
     artificial_viscosity: NonNegative = Field(0.02, description="alpha for liquids")
     artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for materials with shear stiffness")
     artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
-    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.2, description="reach of the lists beyond the support, over h")
-    max_neighbours: Annotated[int, Field(ge=32, le=1024)] = Field(256, description="room in a particle's list")
+    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
 
     def alpha(self, solid: bool) -> float:
         return self.artificial_viscosity_solid if solid else self.artificial_viscosity
@@ -49,8 +48,9 @@ class SolverSPH(Solver):
     paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
     features = frozenset(Feature)
     Config: ClassVar = ConfigSPH
-    passes = ("lists", "strain", "force", "move")
-    faults: ClassVar = {FAULT_NEIGHBOURS: "a particle has more neighbours than numerics.sph.max_neighbours"}
+    passes = ("lists", "level", "strain", "force", "move")
+    OWN: ClassVar = ("new_density", "dynamic_density", "load", "stress_normal", "stress_shear", "acceleration")
+    faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
 
@@ -98,10 +98,12 @@ class SolverSPH(Solver):
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
             self.new_density = wp.zeros(pool.size, dtype=float)
-            self.stress_normal = wp.zeros(pool.size, dtype=wp.vec3)
+            self.dynamic_density = wp.zeros(pool.size, dtype=float)
+            self.load = wp.zeros(pool.size, dtype=float)
+            self.stress_normal = wp.zeros(solid, dtype=wp.vec3)
             self.stress_shear = wp.zeros(solid, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
-        self.neighbours = Neighbours(scene, pool, 2.0 * self.num.h, config.skin * self.num.h, config.max_neighbours)
+        self.neighbours = Neighbours(scene, pool, 2.0 * self.num.h, config.skin * self.num.h)
         self.pairs = kernels.Lists()
         self.pairs.entries, self.pairs.number = self.neighbours.entries, self.neighbours.number
         self.pairs.row, self.pairs.column = self.neighbours.row, self.neighbours.column
@@ -122,10 +124,19 @@ class SolverSPH(Solver):
     def lists(self) -> None:
         self.neighbours.update()
 
+    def level(self) -> None:
+        pool, scene = self.pool, self.scene
+        wp.launch(
+            kernels.level,
+            pool.size,
+            [pool.capacity, pool.count, scene.phases, scene.gravity, pool.position, pool.phase, pool.density],
+            [self.dynamic_density],
+            device=scene.device,
+        )
+
     def _common(self) -> list[Any]:
         pool, scene = self.pool, self.scene
-        return [self.num, scene.box, self.pairs, pool.capacity, pool.count, scene.dt, scene.phases, scene.gravity,
-                pool.position, pool.velocity, pool.mass, pool.phase]  # fmt: skip
+        return [self.num, scene.box, self.pairs, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase]
 
     def strain(self) -> None:
         pool = self.pool
@@ -133,19 +144,21 @@ class SolverSPH(Solver):
         wp.launch(
             self.kernels.strain,
             pool.size,
-            [*self._common(), pool.held, pool.density],
-            [*elastic, self.new_density, self.stress_normal, self.stress_shear],
+            [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.density, self.dynamic_density],
+            [*elastic, self.new_density, self.load, self.stress_normal, self.stress_shear],
             device=self.scene.device,
         )
 
     def force(self) -> None:
+        pool = self.pool
         wp.launch(
             self.kernels.force,
-            self.pool.size,
-            [*self._common(), self.new_density, self.stress_normal, self.stress_shear],
+            pool.size,
+            [*self._common(), self.scene.gravity, pool.position, pool.velocity, pool.mass, self.new_density, self.load,
+             self.stress_normal, self.stress_shear],
             [self.acceleration],
             device=self.scene.device,
-        )
+        )  # fmt: skip
 
     def move(self) -> None:
         pool, scene = self.pool, self.scene
@@ -168,5 +181,5 @@ class SolverSPH(Solver):
         return self.pool.density.numpy()
 
     def footprint(self) -> dict[str, int]:
-        own = {name: getattr(self, name).capacity for name in ("new_density", "stress_normal", "stress_shear", "acceleration")}
+        own = {name: getattr(self, name).capacity for name in self.OWN}
         return own | self.neighbours.footprint()
