@@ -193,13 +193,14 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
 
 
 def _print_table(console: Any, table: "Table") -> None:
+    from rich.markup import escape
     from rich.table import Table as RichTable
 
     shown = RichTable(title=table.title, title_justify="left", title_style="bold")
     for i, head in enumerate(table.head):
-        shown.add_column(head, justify="left" if i == 0 else "right", overflow="fold")
+        shown.add_column(escape(head), justify="left" if i == 0 else "right", overflow="fold")
     for row in table.rows:
-        shown.add_row(*row)
+        shown.add_row(*map(escape, row))
     console.print(shown)
     if table.note:
         console.print(table.note, markup=False, highlight=False)

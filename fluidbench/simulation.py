@@ -104,7 +104,7 @@ class Simulation:
         if self.emission is not None:
             self.emission.advance(self.now, self.tick)
         if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
-            self._reorder(keys)
+            self.reorder(keys)
         if self.pool.stale:
             self.solver.refresh()
             self.pool.stale = False
@@ -120,7 +120,8 @@ class Simulation:
         self.speed = max(vital.speed, 0.1 * self.scenario.reference_speed)
         return vital
 
-    def _reorder(self, keys: wp.array) -> None:
+    def reorder(self, keys: wp.array) -> None:
+        """Sort the pool by a solver's keys."""
         self._order.assign(self._identity)
         wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
         self.pool.permute(self._order)

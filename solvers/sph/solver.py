@@ -16,6 +16,7 @@ from fluidbench.timestep import Bound
 from .. import neighbours
 from ..neighbours import FAULT_NEIGHBOURS, Neighbours
 from ..order import CellOrder
+from ..smoothing import wendland_slope
 from . import kernels_warp as kernels
 
 NonNegative = Annotated[float, Field(ge=0)]
@@ -24,7 +25,7 @@ Ratio = Annotated[float, Field(ge=1.0, le=3.0)]
 
 class ConfigSPH(Config):
     smoothing_ratio: Ratio = Field(1.2, description="smoothing length h over spacing, for liquids")
-    smoothing_ratio_solid: Ratio = Field(1.5, description="the same for materials with shear stiffness")
+    smoothing_ratio_solid: Ratio = Field(1.3, description="the same for materials with shear stiffness")
     cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
     viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
     force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
@@ -32,6 +33,9 @@ class ConfigSPH(Config):
     artificial_viscosity: NonNegative = Field(0.02, description="alpha for liquids")
     artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for materials with shear stiffness")
     artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
+    density_feedback: NonNegative = Field(
+        0.02, description="rate, in c / h, at which integrated density follows the summed one (with shear stiffness)"
+    )
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
 
     def alpha(self, solid: bool) -> float:
@@ -85,10 +89,12 @@ class SolverSPH(Solver):
         self.num = kernels.Smoothing()
         self.num.h = config.smoothing(scene.elastic) * scene.spacing
         self.num.spacing = scene.spacing
+        self.num.lattice = 1.0 / lattice_moment(config.smoothing(scene.elastic))
         self.num.sound_speed = scene.wave_speed
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.elastic)
         self.num.artificial_stress = config.artificial_stress
+        self.num.density_feedback = config.density_feedback
         pool.add_field("density", float, scene.scenario.material.density)
         self._rest_densities()
         solid = pool.size if scene.elastic else 1
@@ -183,3 +189,10 @@ class SolverSPH(Solver):
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}
         return own | self.neighbours.footprint()
+
+
+def lattice_moment(ratio: float) -> float:
+    """One third of the trace of sum V r r^T |W'| / r on a unit lattice, h = ratio; 1 in the continuum."""
+    axis = np.arange(-int(2 * ratio) - 1, int(2 * ratio) + 2)
+    r2 = sum(np.square(g) for g in np.meshgrid(axis, axis, axis)).ravel()
+    return -sum(value * wendland_slope(math.sqrt(value) / ratio, ratio) for value in r2) / 3.0
