@@ -238,12 +238,24 @@ class Neighbours:
             [self.outdated],
             device=self.scene.device,
         )
-        wp.capture_if(self.outdated, on_true=self._renew)
+        if self.scene.device.is_cpu:
+            wp.capture_if(self.outdated, on_true=self._renew)
+        else:
+            # The grid's sort cannot be part of a CUDA conditional: it is built at every substep, the lists are not.
+            self._build()
+            wp.capture_if(self.outdated, on_true=self._fill)
 
     def _renew(self) -> None:
+        self._build()
+        self._fill()
+
+    def _build(self) -> None:
         pool, device = self.pool, self.scene.device
         wp.launch(mark_worlds, pool.size, [pool.capacity, pool.worlds, pool.count], [self.group], device=device)
         self.grid.build(pool.position, self.reach, groups=self.group)
+
+    def _fill(self) -> None:
+        pool, device = self.pool, self.scene.device
         wp.launch(
             fill_lists,
             pool.size,

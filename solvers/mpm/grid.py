@@ -1,7 +1,7 @@
 """The background grid of MPM: blocks of 4 x 4 x 4 nodes, allocated where there is material.
 
-Node 4 of a walled axis lies on the lower wall, node 4 + cells on the upper one; a periodic axis has the nodes
-4 .. 4 + cells - 1. `table` holds slot + 1 of each block of each world, 0 where there is none.
+Node 4 of a walled axis lies on the lower wall, node 4 + cells on the upper one; a periodic axis has `cells` nodes from
+node `first` on, so placed that no block holds just one of them: then any three neighbours lie in two blocks. `table` holds slot + 1 of each block of each world, 0 where there is none.
 """
 
 import numpy as np
@@ -21,6 +21,7 @@ class Grid:
     dx: float  # node spacing [m]
     inv_dx: float  # [1/m]
     cells: wp.vec3i
+    first: wp.vec3i  # node at the lower face
     wrap: wp.vec3i  # cells along periodic axes, else 0
     blocks: wp.vec3i
     blocks_per_world: int
@@ -37,10 +38,12 @@ def grid_of(scene: Scene, dx: float) -> Grid:
     domain, grid = scene.scenario.domain, Grid()
     length = np.asarray(domain.upper) - np.asarray(domain.lower)
     cells = np.maximum(1, np.rint(length / dx)).astype(int)
-    blocks = (cells + 2 * FIRST) // 4 + 1
+    lone = np.asarray(scene.periodic) & (cells % 4 == 1)
+    first = np.where(lone, FIRST + 2, FIRST)
+    blocks = (cells + 2 * FIRST + 2) // 4 + 1
     if int(np.prod(blocks)) * scene.worlds > MAX_BLOCKS:
         raise UserError(f"the domain holds {np.prod(blocks):.3g} grid blocks; use a smaller domain or a larger spacing")
-    grid.origin = wp.vec3(*(np.asarray(domain.lower) - FIRST * dx))
+    grid.origin, grid.first = wp.vec3(*(np.asarray(domain.lower) - first * dx)), wp.vec3i(*first.tolist())
     grid.dx, grid.inv_dx = dx, 1.0 / dx
     grid.cells, grid.blocks = wp.vec3i(*cells.tolist()), wp.vec3i(*blocks.tolist())
     grid.wrap = wp.vec3i(*[int(n) if periodic else 0 for n, periodic in zip(cells, scene.periodic, strict=True)])
@@ -52,13 +55,13 @@ def grid_of(scene: Scene, dx: float) -> Grid:
 
 
 @wp.func
-def wrapped(node: int, wrap: int):
+def wrapped(node: int, first: int, wrap: int):
     """Index of a node on a periodic axis of `wrap` cells; unchanged on a walled one (wrap = 0)."""
     inside = node
     if wrap > 0:
-        if node < FIRST:
+        if node < first:
             inside = node + wrap
-        elif node >= FIRST + wrap:
+        elif node >= first + wrap:
             inside = node - wrap
     return inside
 
@@ -95,9 +98,9 @@ def activate_stencil(
 ):  # fmt: skip
     """Activate the blocks of the 27 nodes that start at `base`: those of its eight corners."""
     for corner in range(8):
-        i = wrapped(base[0] + 2 * (corner >> 2), grid.wrap[0])
-        j = wrapped(base[1] + 2 * ((corner >> 1) & 1), grid.wrap[1])
-        k = wrapped(base[2] + 2 * (corner & 1), grid.wrap[2])
+        i = wrapped(base[0] + 2 * (corner >> 2), grid.first[0], grid.wrap[0])
+        j = wrapped(base[1] + 2 * ((corner >> 1) & 1), grid.first[1], grid.wrap[1])
+        k = wrapped(base[2] + 2 * (corner & 1), grid.first[2], grid.wrap[2])
         activate_block(grid, world, i, j, k, table, block_of, active, fault)
 
 

@@ -10,7 +10,7 @@ from fluidbench.scene import FRICTION, PERIODIC, STICK, Phase
 
 from .. import constitutive
 from ..bind import warp_func
-from ..scatter import add_vec4
+from ..vector_access import add_vec4, load_vec4
 from ..smoothing import quadratic_spline
 from .grid import FIRST, Grid, activate_stencil, first_node, node_of, raw_node, wrapped
 
@@ -61,9 +61,9 @@ def node_parts(grid: Grid, base: wp.vec3i):
     bx, by, bz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
     lx, ly, lz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
     for o in range(3):
-        i = wrapped(base[0] + o, grid.wrap[0])
-        j = wrapped(base[1] + o, grid.wrap[1])
-        k = wrapped(base[2] + o, grid.wrap[2])
+        i = wrapped(base[0] + o, grid.first[0], grid.wrap[0])
+        j = wrapped(base[1] + o, grid.first[1], grid.wrap[1])
+        k = wrapped(base[2] + o, grid.first[2], grid.wrap[2])
         bx[o] = (i >> 2) * grid.blocks[1] * grid.blocks[2]
         by[o] = (j >> 2) * grid.blocks[2]
         bz[o] = k >> 2
@@ -71,6 +71,17 @@ def node_parts(grid: Grid, base: wp.vec3i):
         ly[o] = (j & 3) << 2
         lz[o] = k & 3
     return bx, by, bz, lx, ly, lz
+
+
+@wp.func
+def slots_of(table: wp.array(dtype=int), start: int, bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i):
+    """Slots of the (at most) eight blocks of a stencil, -1 where there is none; z varies fastest."""
+    return (
+        table[start + bx[0] + by[0] + bz[0]] - 1, table[start + bx[0] + by[0] + bz[2]] - 1,
+        table[start + bx[0] + by[2] + bz[0]] - 1, table[start + bx[0] + by[2] + bz[2]] - 1,
+        table[start + bx[2] + by[0] + bz[0]] - 1, table[start + bx[2] + by[0] + bz[2]] - 1,
+        table[start + bx[2] + by[2] + bz[0]] - 1, table[start + bx[2] + by[2] + bz[2]] - 1,
+    )  # fmt: skip
 
 
 @wp.func
@@ -136,20 +147,25 @@ def p2g(
         bx, by, bz, lx, ly, lz = node_parts(grid, base)
         a *= grid.dx
         momentum = m * velocity[p] - a * f
-        start = world * grid.blocks_per_world
+        s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
+        if wp.min(wp.min(wp.min(s0, s1), wp.min(s2, s3)), wp.min(wp.min(s4, s5), wp.min(s6, s7))) < 0:
+            fault[0] = FAULT_STENCIL
+            return
         for o in range(3):
+            low = bx[o] == bx[0]
+            t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
+            t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
             mx = momentum + float(o) * wp.vec3(a[0, 0], a[1, 0], a[2, 0])
             for q in range(3):
+                near = by[q] == by[0]
+                u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
                 my = mx + float(q) * wp.vec3(a[0, 1], a[1, 1], a[2, 1])
                 wxy = wx[o] * wy[q]
                 for r in range(3):
                     mv = my + float(r) * wp.vec3(a[0, 2], a[1, 2], a[2, 2])
-                    slot = table[start + bx[o] + by[q] + bz[r]] - 1
+                    slot = wp.where(bz[r] == bz[0], u0, u1)
                     w = wxy * wz[r]
-                    if slot >= 0:
-                        add_vec4(raw, slot * 64 + lx[o] + ly[q] + lz[r], wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m))
-                    else:
-                        fault[0] = FAULT_STENCIL
+                    add_vec4(raw, slot * 64 + lx[o] + ly[q] + lz[r], wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m))
 
 
 @wp.func
@@ -416,17 +432,22 @@ def g2p(
             wz0, wz1, wz2 = spline(f[2])
             wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
             bx, by, bz, lx, ly, lz = node_parts(grid, base)
-            start = world * grid.blocks_per_world
+            s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
             v = wp.vec3(0.0, 0.0, 0.0)
             density = float(0.0)
             cx, cy, cz = wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0)
             for o in range(3):
+                low = bx[o] == bx[0]
+                t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
+                t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
                 vx = wp.vec3(0.0, 0.0, 0.0)
                 for q in range(3):
+                    near = by[q] == by[0]
+                    u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
                     vy = wp.vec3(0.0, 0.0, 0.0)
                     for r in range(3):
-                        slot = wp.max(table[start + bx[o] + by[q] + bz[r]] - 1, 0)
-                        node = moving[slot * 64 + lx[o] + ly[q] + lz[r]]
+                        slot = wp.where(bz[r] == bz[0], u0, u1)
+                        node = load_vec4(moving, wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r])
                         u = wz[r] * wp.vec3(node[0], node[1], node[2])
                         density += wx[o] * wy[q] * wz[r] * node[3]
                         vy += u

@@ -1,4 +1,4 @@
-"""A four-float accumulation into memory, as one vector reduction where the GPU has one."""
+"""Four floats at once: one vector reduction and one 16-byte load, where the GPU has them."""
 
 import warp as wp
 
@@ -18,4 +18,19 @@ import warp as wp
 )
 def add_vec4(target: wp.array(dtype=wp.vec4), index: int, value: wp.vec4):
     """target[index] += value, atomic per component. The CPU backend runs one thread and needs no atomics."""
+    ...
+
+
+@wp.func_native(
+    snippet="""
+#if defined(__CUDA_ARCH__)
+    const float4 node = __ldg((const float4*)&source[index]);
+    return wp::vec_t<4, wp::float32>(node.x, node.y, node.z, node.w);
+#else
+    return source[index];
+#endif
+"""
+)
+def load_vec4(source: wp.array(dtype=wp.vec4), index: int) -> wp.vec4:
+    """source[index], which the running kernel must not write."""
     ...
