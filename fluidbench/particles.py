@@ -23,6 +23,11 @@ CORE = {
 }
 
 
+def whole_warps(capacity: int) -> int:
+    """Capacity rounded up to whole groups of 32 slots, so that no GPU warp is cut by the end of a launch."""
+    return 32 * max(1, -(-capacity // 32))
+
+
 class OutOfCapacity(RuntimeError):
     """The pool cannot hold what is to be added; the message says how much is needed."""
 
@@ -40,7 +45,7 @@ class Pool:
                 f"{scene.worlds} world(s) of {capacity} particles exceed the {MAX_SLOTS} that can be addressed; "
                 "use a larger spacing"
             )
-        self.scene, self.capacity, self.worlds = scene, max(1, capacity), scene.worlds
+        self.scene, self.capacity, self.worlds = scene, whole_warps(capacity), scene.worlds
         self.size = self.worlds * self.capacity
         self.counts = [0] * self.worlds
         self.stale = True  # set whenever particles appear or move otherwise than by a substep

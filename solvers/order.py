@@ -30,10 +30,11 @@ def cell_keys(
 
 
 class CellOrder:
-    """Sort keys of a pool for cells of a given edge [m]."""
+    """Sort keys of a pool for cells of a given edge [m], the first of which begins `shift` edges below the domain."""
 
-    def __init__(self, scene: Scene, pool: Pool, cell: float) -> None:
+    def __init__(self, scene: Scene, pool: Pool, cell: float, shift: float = 0.0) -> None:
         self.scene, self.pool, self.cell = scene, pool, cell
+        self.lower = scene.box.lower - wp.vec3(shift * cell, shift * cell, shift * cell)
         domain = scene.scenario.domain
         length = np.asarray(domain.upper) - np.asarray(domain.lower)
         self.blocks = wp.vec3i(*(np.ceil(length / (4 * cell)).astype(int) + 1).tolist())
@@ -44,7 +45,7 @@ class CellOrder:
         wp.launch(
             cell_keys,
             self.pool.size,
-            [self.scene.box.lower, 1.0 / self.cell, self.blocks, self.pool.capacity, self.pool.count,
+            [self.lower, 1.0 / self.cell, self.blocks, self.pool.capacity, self.pool.count,
              self.pool.position, self.values],
             device=self.scene.device,
         )  # fmt: skip

@@ -10,7 +10,7 @@ from fluidbench.scene import FRICTION, PERIODIC, STICK, Phase
 
 from .. import constitutive
 from ..bind import warp_func
-from ..vector_access import add_vec4, load_vec4
+from ..vector_access import add_vec4, in_company, load_vec4, run_of
 from ..smoothing import quadratic_spline
 from .grid import FIRST, Grid, activate_stencil, first_node, node_of, raw_node, wrapped
 
@@ -115,57 +115,65 @@ def p2g(
     """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18)."""
     p = wp.tid()
     world = p / capacity
-    if p - world * capacity < count[world]:
-        h = dt[world]
-        phase = phases[world, phase_of[p]]
-        c = affine[p]
-        j = volume_ratio[p]
-        b = elastic_normal[p]
-        s = elastic_shear[p]
-        m = mass[p]
-        a = m * c
-        if held[p] == 0:
-            j *= wp.max(1.0 + h * wp.trace(c), 0.1)
-            volume_ratio[p] = j
-            if phase.shear_modulus > 0.0:
-                b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                    c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2],
-                    b[0], b[1], b[2], s[0], s[1], s[2],
-                    phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, h,
-                )  # fmt: skip
-                b = wp.vec3(b_xx, b_yy, b_zz)
-                s = wp.vec3(b_xy, b_xz, b_yz)
-                elastic_normal[p] = b
-                elastic_shear[p] = s
-            a -= (4.0 * h * grid.inv_dx * grid.inv_dx * volume[p]) * kirchhoff(phase, j, b, s, c)
-        base = first_node(grid, position[p])
-        f = (position[p] - grid.origin) * grid.inv_dx - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
-        wx0, wx1, wx2 = spline(f[0])
-        wy0, wy1, wy2 = spline(f[1])
-        wz0, wz1, wz2 = spline(f[2])
-        wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
-        bx, by, bz, lx, ly, lz = node_parts(grid, base)
-        a *= grid.dx
-        momentum = m * velocity[p] - a * f
-        s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
-        if wp.min(wp.min(wp.min(s0, s1), wp.min(s2, s3)), wp.min(wp.min(s4, s5), wp.min(s6, s7))) < 0:
-            fault[0] = FAULT_STENCIL
+    on = p - world * capacity < count[world]
+    if not on:
+        if not in_company():
             return
-        for o in range(3):
-            low = bx[o] == bx[0]
-            t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
-            t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
-            mx = momentum + float(o) * wp.vec3(a[0, 0], a[1, 0], a[2, 0])
-            for q in range(3):
-                near = by[q] == by[0]
-                u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
-                my = mx + float(q) * wp.vec3(a[0, 1], a[1, 1], a[2, 1])
-                wxy = wx[o] * wy[q]
-                for r in range(3):
-                    mv = my + float(r) * wp.vec3(a[0, 2], a[1, 2], a[2, 2])
-                    slot = wp.where(bz[r] == bz[0], u0, u1)
-                    w = wxy * wz[r]
-                    add_vec4(raw, slot * 64 + lx[o] + ly[q] + lz[r], wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m))
+        p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
+    h = dt[world]
+    phase = phases[world, phase_of[p]]
+    c = affine[p]
+    j = volume_ratio[p]
+    b = elastic_normal[p]
+    s = elastic_shear[p]
+    m = mass[p]
+    a = m * c
+    if held[p] == 0 and on:
+        j *= wp.max(1.0 + h * wp.trace(c), 0.1)
+        volume_ratio[p] = j
+        if phase.shear_modulus > 0.0:
+            b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
+                c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2],
+                b[0], b[1], b[2], s[0], s[1], s[2],
+                phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, h,
+            )  # fmt: skip
+            b = wp.vec3(b_xx, b_yy, b_zz)
+            s = wp.vec3(b_xy, b_xz, b_yz)
+            elastic_normal[p] = b
+            elastic_shear[p] = s
+        a -= (4.0 * h * grid.inv_dx * grid.inv_dx * volume[p]) * kirchhoff(phase, j, b, s, c)
+    base = first_node(grid, position[p])
+    f = (position[p] - grid.origin) * grid.inv_dx - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
+    wx0, wx1, wx2 = spline(f[0])
+    wy0, wy1, wy2 = spline(f[1])
+    wz0, wz1, wz2 = spline(f[2])
+    wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+    bx, by, bz, lx, ly, lz = node_parts(grid, base)
+    s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
+    if on and wp.min(wp.min(wp.min(s0, s1), wp.min(s2, s3)), wp.min(wp.min(s4, s5), wp.min(s6, s7))) < 0:
+        fault[0] = FAULT_STENCIL
+        on = False
+    run = run_of(wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1))
+    if not on and not in_company():
+        return
+    a *= grid.dx
+    momentum = m * velocity[p] - a * f
+    for o in range(3):
+        low = bx[o] == bx[0]
+        t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
+        t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
+        mx = momentum + float(o) * wp.vec3(a[0, 0], a[1, 0], a[2, 0])
+        for q in range(3):
+            near = by[q] == by[0]
+            u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
+            my = mx + float(q) * wp.vec3(a[0, 1], a[1, 1], a[2, 1])
+            wxy = wx[o] * wy[q]
+            for r in range(3):
+                mv = my + float(r) * wp.vec3(a[0, 2], a[1, 2], a[2, 2])
+                slot = wp.where(bz[r] == bz[0], u0, u1)
+                w = wxy * wz[r]
+                node = wp.where(on, slot * 64 + lx[o] + ly[q] + lz[r], -1)
+                add_vec4(raw, node, wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m), run)
 
 
 @wp.func

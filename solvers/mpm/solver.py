@@ -97,7 +97,7 @@ class SolverMPM(Solver):
             self.active = wp.zeros(1, dtype=int)
             self.raw = wp.empty(slots * 64, dtype=wp.vec4)
             self.moving = wp.empty(slots * 64, dtype=wp.vec4)
-        self.order = CellOrder(scene, pool, self.grid.dx)
+        self.order = CellOrder(scene, pool, self.grid.dx, shift=0.5)  # particles of one cell share their 27 nodes
         self.node_lanes = min(scene.lanes, slots * 64)
 
     def refresh(self) -> None:
@@ -128,6 +128,7 @@ class SolverMPM(Solver):
              pool.mass, pool.volume, pool.phase, pool.held, self.table],
             [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, pool.fault],
             device=scene.device,
+            block_dim=128,
         )  # fmt: skip
 
     def grid_step(self) -> None:
