@@ -60,7 +60,8 @@ def measure(particles: int, device: str, steps: int, warmup: int) -> dict[str, o
         "benchmark": "mpm_block", "device": device, "particles": n, "steps": steps, "steps_per_s": steps / wall,
         "particle_substeps_per_s": n * steps * SUBSTEPS / wall,
         "particle_substeps_per_cpu_s": n * steps * SUBSTEPS / cpu,
-        "microseconds_a_substep": 1e6 * wall / (steps * SUBSTEPS), "top_speed_m_s": vital.speed, "complaint": vital.complaint,
+        "microseconds_a_substep": 1e6 * wall / (steps * SUBSTEPS),
+        "top_speed_m_s": vital.speed, "complaint": vital.complaint,
     }  # fmt: skip
 
 

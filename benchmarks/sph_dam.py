@@ -1,6 +1,6 @@
 """Throughput of WCSPH alone, one thread: a column a x 2a x 0.5a of about 20,000 particles collapses in a tank.
 
-    python benchmarks/sph_dam.py --particles 20000 --simulated 0.33
+python benchmarks/sph_dam.py --particles 20000 --simulated 0.33
 """
 
 import argparse

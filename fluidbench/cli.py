@@ -188,7 +188,9 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
     for result in results:
         if not result.ok:
             verdict = result.record["verdict"]
-            console.print(f"{result.label}: {verdict}: {result.record['reason']}; {ADVICE.get(verdict, '')}", markup=False)
+            console.print(
+                f"{result.label}: {verdict}: {result.record['reason']}; {ADVICE.get(verdict, '')}", markup=False
+            )
     console.print(f"report: {page}", markup=False, highlight=False, soft_wrap=True)
 
 

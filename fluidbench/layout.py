@@ -15,7 +15,9 @@ def sample(body: Body, scenario: Scenario) -> tuple[np.ndarray, float]:
     cells = np.maximum(1, np.rint(2.0 * body.extent / scenario.spacing).astype(int))
     axes = [(np.arange(n) + 0.5) * scenario.spacing - 0.5 * n * scenario.spacing for n in cells]
     if body.kind == "box":
-        axes = [axis * (2.0 * half / (n * scenario.spacing)) for axis, half, n in zip(axes, body.extent, cells, strict=True)]
+        axes = [
+            axis * (2.0 * half / (n * scenario.spacing)) for axis, half, n in zip(axes, body.extent, cells, strict=True)
+        ]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     if body.kind == "cylinder":
         points = points[np.hypot(points[:, 0], points[:, 1]) <= body.extent[0]]

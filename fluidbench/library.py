@@ -100,7 +100,10 @@ def _assign(table: dict[str, Any], key: str, value: Any) -> None:
         node = node[_position(node, part, key)] if isinstance(node, list) else node.setdefault(part, {})
         if not isinstance(node, dict | list):
             raise UserError(f"--set {key}: '{part}' is a value, not a table")
-    node[_position(node, last, key) if isinstance(node, list) else last] = value
+    if isinstance(node, list):
+        node[_position(node, last, key)] = value
+    else:
+        node[last] = value
 
 
 def _position(node: list[Any], part: str, key: str) -> int:

@@ -37,7 +37,9 @@ class Material(BaseModel):
         if self.youngs_modulus is None and (self.yield_stress is not None or self.relaxation_time is not None):
             raise ValueError("yield_stress and relaxation_time need youngs_modulus (100 x yield_stress is usual)")
         if self.relaxation_time is not None and (self.yield_stress is not None or self.plastic_viscosity > 0):
-            raise ValueError("relaxation_time stands for a Maxwell liquid: leave out yield_stress and plastic_viscosity")
+            raise ValueError(
+                "relaxation_time stands for a Maxwell liquid: leave out yield_stress and plastic_viscosity"
+            )
         if self.plastic_viscosity > 0 and self.yield_stress is None:
             raise ValueError("plastic_viscosity needs yield_stress (0 for a Maxwell liquid, or use viscosity)")
         return self

@@ -93,7 +93,6 @@ def _post_mortem(job: Job, folder: Path, code: int, timed: bool) -> dict[str, An
 
 def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
     """Run a job in this process; writes the series, the last snapshot and the record into the folder."""
-    import numpy as np
     import pandas as pd
     import warp as wp
 
@@ -111,16 +110,18 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
 
     def observe(sim: Simulation, vital: Any) -> None:
         frame = sim.pool.snapshot()
-        rows.append({"time_s": sim.now, "top_speed_m_s": vital.speed, **ledger(frame, scenario), **lengths(frame, scenario)})
+        rows.append(
+            {"time_s": sim.now, "top_speed_m_s": vital.speed, **ledger(frame, scenario), **lengths(frame, scenario)}
+        )
         if job.keep_frames:
-            np.savez(folder / f"frame_{len(rows) - 1:04d}.npz", time=sim.now, **frame)
+            save(folder / f"frame_{len(rows) - 1:04d}.npz", frame, sim.now)
         report({"time": sim.now, "until": scenario.duration, "speed": vital.speed})
 
     outcome = simulation.run(observe, job.wall_limit)
     frame = simulation.pool.snapshot()
     series = pd.DataFrame(rows)
     series.to_parquet(folder / "series.parquet")
-    np.savez(folder / "final.npz", time=simulation.now, **frame)
+    save(folder / "final.npz", frame, simulation.now)
     complete = outcome.verdict is Verdict.COMPLETED
     final = {**ledger(frame, scenario), **final_lengths(frame, scenario)} if complete else {}
     record = {
@@ -139,6 +140,17 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     }  # fmt: skip
     write_atomically(folder / RECORD, json.dumps(record, indent=1))
     return record
+
+
+def save(path: Path, frame: dict[str, Any], time: float) -> None:
+    """A snapshot and its time, written atomically."""
+    import io
+
+    import numpy as np
+
+    buffer = io.BytesIO()
+    np.savez(buffer, time=time, **frame)
+    write_atomically(path, buffer.getvalue())
 
 
 def cost(outcome: Any, simulation: Any, total: float) -> dict[str, float]:

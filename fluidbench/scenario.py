@@ -72,7 +72,7 @@ class Domain(Model):
     def contains(self, points, margin: float = 1e-9) -> np.ndarray:
         points = np.asarray(points, dtype=float)
         inside = (points >= np.array(self.lower) - margin) & (points <= np.array(self.upper) + margin)
-        return inside.all(axis=-1)
+        return np.asarray(inside.all(axis=-1))
 
 
 class Nozzle(Model):
@@ -198,7 +198,8 @@ class Scenario(Model):
                 "at least 2 particles must fit across it, 8 resolve a bead"
             )
         r = self.nozzle.diameter / 2
-        low, high = self.track.position.min(axis=0) - (r, r, 0), self.track.position.max(axis=0) + (r, r, 0)
+        margin = np.array([r, r, 0.0])
+        low, high = self.track.position.min(axis=0) - margin, self.track.position.max(axis=0) + margin
         for axis, a, b in zip("xyz", low, high, strict=True):
             i = "xyz".index(axis)
             if a < self.domain.lower[i] or b > self.domain.upper[i]:
@@ -220,7 +221,9 @@ class Scenario(Model):
         for axis, periodic in enumerate(self.domain.walls.periodic()):
             length = self.domain.upper[axis] - self.domain.lower[axis]
             if periodic and length < 6 * self.spacing:
-                raise ValueError(f"a periodic axis needs at least 6 spacings; {'xyz'[axis]} has {length / self.spacing:.3g}")
+                raise ValueError(
+                    f"a periodic axis needs at least 6 spacings; {'xyz'[axis]} has {length / self.spacing:.3g}"
+                )
 
     @cached_property
     def track(self) -> Track | None:
@@ -243,7 +246,10 @@ class Scenario(Model):
             speeds.append(math.hypot(self.nozzle.speed, self.toolpath.speed))
             height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
         for body in self.bodies:
-            corners = np.asarray(body.center) + np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * body.extent
+            corners = (
+                np.asarray(body.center)
+                + np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * body.extent
+            )
             speeds.append(float(np.linalg.norm(body.velocity_at(corners), axis=1).max()))
             height = max(height, float(body.center[2] + body.extent[2]) - self.domain.lower[2])
         return max(*speeds, math.sqrt(g * height))

@@ -147,7 +147,9 @@ class Simulation:
         words = [text for bit, text in self.solver.faults.items() if bits & bit]
         return "; ".join(words) if words else None
 
-    def run(self, observe: Callable[["Simulation", Vital], None] | None = None, wall_limit: float | None = None) -> Outcome:
+    def run(
+        self, observe: Callable[["Simulation", Vital], None] | None = None, wall_limit: float | None = None
+    ) -> Outcome:
         """Run to the end, or until something breaks; `observe` is called at every output, off the clock."""
         outcome = Outcome(Verdict.COMPLETED)
         start = time.perf_counter()

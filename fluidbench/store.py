@@ -39,7 +39,9 @@ class Store:
             probe = tempfile.NamedTemporaryFile(dir=root)  # noqa: SIM115
             probe.close()
         except OSError as error:
-            raise UserError(f"cannot write to the output folder {root}: {error.strerror}; choose another with --out") from None
+            raise UserError(
+                f"cannot write to the output folder {root}: {error.strerror}; choose another with --out"
+            ) from None
 
     def folder(self, name: str, inputs: dict[str, Any]) -> Path:
         return self.root / "runs" / f"{name}-{key_of(inputs)}"

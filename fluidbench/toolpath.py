@@ -27,7 +27,9 @@ class Toolpath(BaseModel):
     dwell: Positive | None = Field(None, description="speed 0: how long the fixed nozzle extrudes [s]")
     layers: Annotated[int, Field(ge=1, le=10_000)] = Field(1, description="number of layers")
     layer_height: Positive | None = Field(None, description="rise of the nozzle after each layer [m]")
-    pause: NonNegative = Field(0.0, description="pause after each layer, without flow; at least the rise at `speed` [s]")
+    pause: NonNegative = Field(
+        0.0, description="pause after each layer, without flow; at least the rise at `speed` [s]"
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> "Toolpath":

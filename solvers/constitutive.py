@@ -106,10 +106,6 @@ def strain_and_flow(
     c_xy = keep * c_xy
     c_xz = keep * c_xz
     c_yz = keep * c_yz
-    det = (
-        c_xx * (c_yy * c_zz - c_yz * c_yz)
-        - c_xy * (c_xy * c_zz - c_yz * c_xz)
-        + c_xz * (c_xy * c_yz - c_yy * c_xz)
-    )
+    det = c_xx * (c_yy * c_zz - c_yz * c_yz) - c_xy * (c_xy * c_zz - c_yz * c_xz) + c_xz * (c_xy * c_yz - c_yy * c_xz)
     unit = 3.0 / (2.0 + max(det, 0.0))
     return c_xx * unit, c_yy * unit, c_zz * unit, c_xy * unit, c_xz * unit, c_yz * unit

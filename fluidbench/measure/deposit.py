@@ -141,7 +141,9 @@ class Section:
         return float((rows[-1] + 1) * (self.up[1] - self.up[0])) if len(rows) else 0.0
 
 
-def cut(deposit: Deposit, point: np.ndarray, direction: np.ndarray, reach: float, height: float, floor: float) -> Section:
+def cut(
+    deposit: Deposit, point: np.ndarray, direction: np.ndarray, reach: float, height: float, floor: float
+) -> Section:
     """The section through `point` (x, y) square to `direction`, averaged over three cells along the path."""
     step = deposit.spacing / FINE
     normal = np.array([-direction[1], direction[0]])

@@ -78,7 +78,9 @@ def _slump(scenario: Scenario, slump: float) -> Answer:
     best = data[["slump_vof", "slump_mpm_extrap"]].mean(axis=1)
     expected = float(np.interp(tau, data["tau_prime"], best))
     note = "absolute" if 0.05 <= tau <= 0.3 else "absolute; tau' outside the table, its end value taken"
-    return Answer(f"slump at tau' = {tau:.3g}", slump, expected, abs(slump - expected), note, "viscoplastic_slump_crosscheck.csv")
+    return Answer(
+        f"slump at tau' = {tau:.3g}", slump, expected, abs(slump - expected), note, "viscoplastic_slump_crosscheck.csv"
+    )
 
 
 def _front(scenario: Scenario, series: pd.DataFrame) -> Answer:
@@ -92,7 +94,9 @@ def _front(scenario: Scenario, series: pd.DataFrame) -> Answer:
     shifts = np.linspace(-GATE_SHIFT, GATE_SHIFT, 61)
     reached = [data["T"].to_numpy() + shift for shift in shifts]
     if clock[-1] < data["T"].max() - GATE_SHIFT:
-        return Answer("front RMS", float("nan"), 0.0, float("nan"), "run too short for the table", "Martin & Moyce 1952")
+        return Answer(
+            "front RMS", float("nan"), 0.0, float("nan"), "run too short for the table", "Martin & Moyce 1952"
+        )
     errors = [
         float(np.sqrt(np.mean((np.interp(t, clock, series["front_x_m"] / a) / data["Z"] - 1.0) ** 2))) for t in reached
     ]

@@ -22,7 +22,7 @@ def measure_slump(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
 
 
 def front(deposit: Deposit) -> float:
-    """x at which the height averaged over y falls below one spacing [m] (validation section 0), to sub-cell accuracy."""
+    """x at which the height averaged over y falls below one spacing [m], interpolated (validation section 0)."""
     x, _, heights = deposit.column_heights()
     return _falls_below(x, heights.mean(axis=1), deposit.spacing)
 
@@ -38,7 +38,7 @@ def spread_radius(deposit: Deposit, x0: float, y0: float) -> float:
 
 
 def _falls_below(x: np.ndarray, values: np.ndarray, level: float) -> float:
-    """The last x at which `values` crosses `level` downwards, linear between samples; the first x if it never exceeds."""
+    """The last x at which `values` crosses `level` downwards, linear between samples; the first x if none does."""
     above = np.flatnonzero(values >= level)
     if len(above) == 0:
         return float(x[0])

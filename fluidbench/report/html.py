@@ -24,7 +24,8 @@ table { border-collapse: collapse; margin: .6rem 0; display: block; overflow-x: 
 th, td { padding: .25rem .7rem; border-bottom: 1px solid #ddd; text-align: right; }
 th:first-child, td:first-child { text-align: left; } thead th { border-bottom: 2px solid #888; }
 .grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(28rem, 1fr)); gap: 1rem; }
-.bad { color: #a40000; } img { max-width: 100%; } code { background: #f3f3f3; padding: 0 .25rem; } li { margin: .2rem 0; }
+.bad { color: #a40000; } img { max-width: 100%; }
+code { background: #f3f3f3; padding: 0 .25rem; } li { margin: .2rem 0; }
 </style>{{ plotly_js }}</head><body>
 <h1>{{ title }}</h1>
 <p>{{ subtitle }}</p>
@@ -34,8 +35,10 @@ th:first-child, td:first-child { text-align: left; } thead th { border-bottom: 2
 {% if table.note %}<p>{{ table.note }}</p>{% endif %}{% endfor %}
 {% if failures %}<h2>Runs that are not results</h2><ul>
 {% for line in failures %}<li class="bad">{{ line }}</li>{% endfor %}</ul>{% endif %}
-{% if notes %}<h2>What a method only approximates</h2><ul>{% for line in notes %}<li>{{ line }}</li>{% endfor %}</ul>{% endif %}
-{% if views %}<h2>Views at the end</h2><img alt="side and top views of every method" src="data:image/png;base64,{{ views }}">{% endif %}
+{% if notes %}<h2>What a method only approximates</h2><ul>
+{% for line in notes %}<li>{{ line }}</li>{% endfor %}</ul>{% endif %}
+{% if views %}<h2>Views at the end</h2>
+<img alt="side and top views of every method" src="data:image/png;base64,{{ views }}">{% endif %}
 <h2>Plots</h2><div class="grid">{% for plot in plots %}<div>{{ plot }}</div>{% endfor %}</div>
 <h2>Records</h2><ul>{% for label, path in files %}<li><a href="{{ path }}">{{ label }}</a></li>{% endfor %}</ul>
 <p>{{ machine }}</p>
@@ -81,8 +84,10 @@ def write_page(
         subtitle=scenario.title if scenario is not None else "",
         plotly_js=Markup(f"<script>{get_plotlyjs()}</script>"),
         tables=tables,
-        failures=[f"{r.label}: {r.record['verdict']}: {r.record.get('reason', '')}; {ADVICE.get(r.record['verdict'], '')}"
-                  for r in results if not r.ok],
+        failures=[
+            f"{r.label}: {(v := r.record['verdict'])}: {r.record.get('reason', '')}; {ADVICE.get(v, '')}"
+            for r in results if not r.ok
+        ],
         notes=[f"{r.label}: {line}" for r in results if r.record["repeat"] == 0
                for line in r.record.get("approximations", [])],
         views=base64.b64encode(views.read_bytes()).decode() if views is not None else "",

@@ -31,8 +31,12 @@ def derived(scenario: Scenario) -> Table:
     ]  # fmt: skip
     if scenario.nozzle is not None and scenario.track is not None:
         n = scenario.nozzle
-        rows += [("flow rate Q", n.rate, "m^3/s"), ("exit speed U", n.speed, "m/s"), ("end of extrusion", scenario.track.end, "s")]
-    table.rows += [[name, number(value), unit] for name, value, unit in rows]
+        rows += [
+            ("flow rate Q", n.rate, "m^3/s"),
+            ("exit speed U", n.speed, "m/s"),
+            ("end of extrusion", scenario.track.end, "s"),
+        ]
+    table.rows.extend([name, number(value), unit] for name, value, unit in rows)
     return table
 
 
@@ -48,8 +52,8 @@ def _bounds(estimates: list[Estimate]) -> list[Table]:
 def _needs(estimates: list[Estimate]) -> Table:
     table = Table("Needs", ["method", "particles", "dt [s]", "substeps", "memory [MiB]", "time on one core [s]"])
     for e in estimates:
-        table.rows.append([e.method, str(e.particles), number(e.plan.dt), str(e.substeps), number(e.memory_bytes / 2**20),
-                           number(e.wall_s)])  # fmt: skip
+        needs = [number(e.plan.dt), str(e.substeps), number(e.memory_bytes / 2**20), number(e.wall_s)]
+        table.rows.append([e.method, str(e.particles), *needs])
     notes = [f"{e.method} refuses: {e.refusal}" for e in estimates if e.refusal]
     notes += [f"{e.method} approximates: {line}" for e in estimates for line in e.approximations]
     return Table(table.title, table.head, table.rows, "\n".join(notes))
@@ -58,7 +62,17 @@ def _needs(estimates: list[Estimate]) -> Table:
 def diagnosis() -> list[str]:
     """One line a fact: versions, devices, and for whatever is missing how to get it."""
     lines = [f"python {platform.python_version()} on {platform.platform()}, {os.cpu_count()} cores"]
-    for package in ("fluidbench", "warp-lang", "numpy", "scipy", "pandas", "pyarrow", "pydantic", "matplotlib", "plotly"):
+    for package in (
+        "fluidbench",
+        "warp-lang",
+        "numpy",
+        "scipy",
+        "pandas",
+        "pyarrow",
+        "pydantic",
+        "matplotlib",
+        "plotly",
+    ):
         try:
             lines.append(f"{package} {version(package)}")
         except PackageNotFoundError:

@@ -45,8 +45,8 @@ def fidelity(results: Sequence[Finished]) -> Table:
     hidden = ("momentum", "center", "potential", "particles")
     keys = dict.fromkeys(k for g in done.values() for r in g for k in r["measures"] if not k.startswith(hidden))
     for key in keys:
-        table.rows.append([label(key), *[spread([r["measures"][key] for r in g if key in r["measures"]] or [float("nan")])
-                                         if g else "-" for g in done.values()]])  # fmt: skip
+        values = [[r["measures"][key] for r in g if key in r["measures"]] for g in done.values()]
+        table.rows.append([label(key), *[spread(v) if v else "-" for v in values]])
     return table
 
 

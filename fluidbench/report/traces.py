@@ -65,7 +65,9 @@ def plots(results: Sequence[Finished]) -> list[Plot]:
 
 def _bead_plots(done: Sequence[Finished], scenario: Scenario) -> list[Plot]:
     """Cross-sections over one another, width and height along the path."""
-    section = Plot("section", "cross-section at the middle of the path", "across the path [mm]", "height [mm]", equal=True)
+    section = Plot(
+        "section", "cross-section at the middle of the path", "across the path [mm]", "height [mm]", equal=True
+    )
     width = Plot("width", "bead width along the path", "distance along the path [mm]", "width [mm]")
     height = Plot("height", "bead height along the path", "distance along the path [mm]", "height [mm]")
     for result in done:
@@ -143,4 +145,7 @@ def _cost_plots(results: Sequence[Finished]) -> list[Plot]:
 
 def run_files(results: Sequence[Finished], root: Path) -> list[tuple[str, str]]:
     """(label, path relative to the report) of each run's record."""
-    return [(f"{r.label} #{r.record['repeat'] + 1}", (r.folder / "record.json").relative_to(root).as_posix()) for r in results]
+    return [
+        (f"{r.label} #{r.record['repeat'] + 1}", (r.folder / "record.json").relative_to(root).as_posix())
+        for r in results
+    ]

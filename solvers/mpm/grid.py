@@ -1,7 +1,8 @@
 """The background grid of MPM: blocks of 4 x 4 x 4 nodes, allocated where there is material.
 
 Node 4 of a walled axis lies on the lower wall, node 4 + cells on the upper one; a periodic axis has `cells` nodes from
-node `first` on, so placed that no block holds just one of them: then any three neighbours lie in two blocks. `table` holds slot + 1 of each block of each world, 0 where there is none.
+node `first` on, so placed that no block holds just one of them: then any three neighbours lie in two blocks. `table`
+holds slot + 1 of each block of each world, 0 where there is none.
 """
 
 import numpy as np

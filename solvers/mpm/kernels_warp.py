@@ -10,8 +10,8 @@ from fluidbench.scene import FRICTION, PERIODIC, STICK, Phase
 
 from .. import constitutive
 from ..bind import warp_func
-from ..vector_access import add_vec4, in_company, load_vec4, run_of
 from ..smoothing import quadratic_spline
+from ..vector_access import add_vec4, in_company, load_vec4, run_of
 from .grid import FIRST, Grid, activate_stencil, first_node, node_of, raw_node, wrapped
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})

@@ -102,7 +102,12 @@ class SolverMPM(Solver):
 
     def refresh(self) -> None:
         pool, device = self.pool, self.scene.device
-        wp.launch(kernels.reset_blocks, self.node_lanes, [self.table, self.block_of, self.active, self.node_lanes], device=device)
+        wp.launch(
+            kernels.reset_blocks,
+            self.node_lanes,
+            [self.table, self.block_of, self.active, self.node_lanes],
+            device=device,
+        )
         self.active.zero_()
         wp.launch(
             kernels.find_blocks,
@@ -117,7 +122,9 @@ class SolverMPM(Solver):
             getattr(self, name)()
 
     def clear_grid(self) -> None:
-        wp.launch(kernels.clear_grid, self.node_lanes, [self.active, self.node_lanes, self.raw], device=self.scene.device)
+        wp.launch(
+            kernels.clear_grid, self.node_lanes, [self.active, self.node_lanes, self.raw], device=self.scene.device
+        )
 
     def p2g(self) -> None:
         pool, scene = self.pool, self.scene
@@ -146,9 +153,27 @@ class SolverMPM(Solver):
         wp.launch(
             kernels.g2p,
             pool.size,
-            [self.grid, pool.capacity, pool.count, self.scene.dt, self.moving, self.scene.phases, pool.phase, pool.held,
-             self.feedback],
-            [pool.position, pool.velocity, pool.affine, pool.volume_ratio, self.table, self.block_of, self.active, pool.fault],
+            [
+                self.grid,
+                pool.capacity,
+                pool.count,
+                self.scene.dt,
+                self.moving,
+                self.scene.phases,
+                pool.phase,
+                pool.held,
+                self.feedback,
+            ],
+            [
+                pool.position,
+                pool.velocity,
+                pool.affine,
+                pool.volume_ratio,
+                self.table,
+                self.block_of,
+                self.active,
+                pool.fault,
+            ],
             device=self.scene.device,
         )
 

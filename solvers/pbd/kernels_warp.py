@@ -10,7 +10,7 @@ import warp as wp
 from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
 
 from ..bind import warp_func
-from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, contained, face_kind, image_position, image_velocity
+from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -27,7 +27,8 @@ class Numbers:
     spacing: float  # [m]
     weight: float  # makes the kernel sum of volumes exactly 1 on a lattice at rest [-]
     relaxation: float  # constraint force mixing epsilon [-]
-    over_relaxation: float  # share of the averaged Jacobi correction that is applied [-]
+    over_relaxation: float  # share of the Jacobi correction that is applied [-]
+    anti_clumping: float  # strength k of the artificial pressure of eq. 13 [-]
     sweeps: int  # shear sweeps per substep
 
 
@@ -102,11 +103,13 @@ def correct(
     # outputs
     correction: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """Position correction (eq. 12), as one simultaneous Jacobi step."""
+    """Position correction (eq. 14), as one simultaneous Jacobi step, with artificial pressure against clumping."""
     i = wp.tid()
     if i % capacity < count[i / capacity] and held[i] == 0:
         x = position[i]
         shift = wp.vec3(0.0, 0.0, 0.0)
+        near = 0.2 * num.support
+        inv_w = 1.0 / kernel(near * near, num.support)
         for k in range(lists.number[i]):
             entry = lists.entries[i * lists.row + k * lists.column]
             j = entry & INDEX_MASK
@@ -117,7 +120,9 @@ def correct(
             r = x - xj
             distance = wp.length(r)
             g = volume[j] * num.weight * gradient(distance, num.support) / wp.max(distance, 1.0e-9)
-            shift += ((multiplier[i] + multiplier[j]) * g) * r
+            ratio = kernel(distance * distance, num.support) * inv_w
+            repulsion = num.anti_clumping * ratio * ratio * ratio * ratio
+            shift += ((multiplier[i] + multiplier[j] - repulsion) * g) * r
         correction[i] = (num.over_relaxation * num.spacing * num.spacing) * shift
 
 
@@ -181,7 +186,7 @@ def shear(
     # outputs
     smoothed: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """One XSPH sweep (eq. 17) with a weight from the local shear rate; friction walls rub the particles that they push."""
+    """One XSPH sweep (eq. 17) with a weight from the local shear rate."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world]:

@@ -20,12 +20,13 @@ from . import kernels_warp as kernels
 
 
 class ConfigPBD(Config):
-    support_ratio: Annotated[float, Field(ge=2.0, le=4.0)] = Field(2.3, description="kernel radius H over spacing")
-    iterations: Annotated[int, Field(ge=1, le=200)] = Field(6, description="density iterations per substep")
-    advance: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="accuracy: spacings moved per substep")
+    support_ratio: Annotated[float, Field(ge=2.0, le=4.0)] = Field(2.4, description="kernel radius H over spacing")
+    iterations: Annotated[int, Field(ge=1, le=200)] = Field(3, description="density iterations per substep")
+    advance: Annotated[float, Field(gt=0, le=1)] = Field(0.125, description="accuracy: spacings moved per substep")
     relaxation: Annotated[float, Field(gt=0)] = Field(0.02, description="constraint force mixing epsilon")
     over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
-    shear_sweeps: Annotated[int, Field(ge=1, le=64)] = Field(4, description="XSPH sweeps per substep")
+    anti_clumping: Annotated[float, Field(ge=0)] = Field(0.01, description="artificial pressure k against clumping")
+    shear_sweeps: Annotated[int, Field(ge=1, le=64)] = Field(8, description="XSPH sweeps per substep")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
 
@@ -57,7 +58,9 @@ class SolverPBD(Solver):
         if m.youngs_modulus is not None:
             words.append("no elastic shear stress: a constraint is met or not, whatever Young's modulus says")
         if m.flow_threshold > 0:
-            words.append(f"yield stress becomes an apparent viscosity of at most {most:.3g} Pa s: it creeps, never rests")
+            words.append(
+                f"yield stress becomes an apparent viscosity of at most {most:.3g} Pa s: it creeps, never rests"
+            )
         return [*words, "pressure is whatever keeps rho <= rho0: no equation of state, no sound speed"]
 
     @classmethod
@@ -76,6 +79,7 @@ class SolverPBD(Solver):
         self.num.spacing = scene.spacing
         self.num.weight = 1.0 / _lattice_sum(config.support_ratio)
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
+        self.num.anti_clumping = config.anti_clumping
         self.num.sweeps = config.shear_sweeps
         with wp.ScopedDevice(scene.device):
             self.start = wp.zeros(pool.size, dtype=wp.vec3)

@@ -94,7 +94,7 @@ def level(
 
 @functools.cache
 def passes(strength: bool, viscous: bool) -> SimpleNamespace:
-    """The passes for materials with or without shear stiffness and Newtonian viscosity: unused physics costs nothing."""
+    """The passes for materials with or without shear stiffness and viscosity: unused physics costs nothing."""
     name = f"{'strength' if strength else 'liquid'}_{'viscous' if viscous else 'inviscid'}"
 
     def strain(

@@ -171,7 +171,16 @@ class SolverSPH(Solver):
         wp.launch(
             kernels.move,
             pool.size,
-            [scene.box, scene.spacing, pool.capacity, pool.count, scene.dt, pool.held, self.acceleration, self.new_density],
+            [
+                scene.box,
+                scene.spacing,
+                pool.capacity,
+                pool.count,
+                scene.dt,
+                pool.held,
+                self.acceleration,
+                self.new_density,
+            ],
             [pool.position, pool.velocity, pool.density],
             device=scene.device,
         )

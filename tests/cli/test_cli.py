@@ -1,0 +1,93 @@
+"""The command line end to end, in processes of their own."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pandas as pd
+import pytest
+
+TINY = [
+    "--set", "spacing=0.003", "--set", "duration=0.12", "--set", "output_interval=0.03", "--set", "toolpath.end=[0.03, 0.0]",
+    "--set", "domain.upper=[0.06, 0.03, 0.03]",
+]  # fmt: skip
+
+
+def fluidbench(*arguments, timeout=300):
+    return subprocess.run(
+        [sys.executable, "-m", "fluidbench", *arguments], capture_output=True, text=True, timeout=timeout, check=False
+    )
+
+
+MISTAKES = [
+    (["compare", "line_bead", "--set", "material.densty=1"], "did you mean 'density'"),
+    (["compare", "no_such_scenario"], "no scenario named 'no_such_scenario'"),
+    (["compare", "line_bead", "--solvers", "mpn"], "did you mean 'mpm'"),
+    (["compare", "line_bead", "--set", "numerics.mpm.grid_rato=2"], "did you mean 'grid_ratio'"),
+    (["compare", "line_bead", "--device", "cuda:7"], "no device 'cuda:7'"),
+    (["run", "line_bead", "--out", "/proc/nowhere"], "cannot write"),
+    (["show", "line_bead", "--set", "material.density=-3"], "material.density"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), MISTAKES, ids=lambda v: " ".join(v) if isinstance(v, list) else "")
+def test_mistakes_are_one_line_and_exit_code_2(arguments, words, tmp_path):
+    if "--out" not in arguments and arguments[0] == "compare":
+        arguments = [*arguments, "--out", str(tmp_path / "out")]
+    done = fluidbench(*arguments)
+    assert done.returncode == 2
+    assert words in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_compare_writes_tables_figures_and_a_self_contained_page(tmp_path):
+    done = fluidbench("compare", "line_bead", *TINY, "--out", str(tmp_path))
+    assert done.returncode == 0, done.stdout + done.stderr
+    table = pd.read_parquet(tmp_path / "compare.parquet")
+    assert list(table["method"]) == ["mpm", "sph", "pbd"] and (table["verdict"] == "completed").all()
+    assert (table["bead_width_m"] > 0).all()
+    page = (tmp_path / "report.html").read_text()
+    assert "Plotly" in page and 'src="http' not in page and "data:image/png;base64" in page
+    for name in ("views", "section", "width", "cost"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 5000
+    before = {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}
+    again = fluidbench("compare", "line_bead", *TINY, "--out", str(tmp_path))
+    assert again.returncode == 0
+    assert before == {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}
+
+
+def test_resume_after_a_kill(tmp_path):
+    """kill -9 in the middle of a run: the finished run is kept, the half-finished one is run again."""
+    command = [sys.executable, "-m", "fluidbench", "compare", "line_bead", *TINY, "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.time() + 200
+    while time.time() < deadline and not list(tmp_path.glob("runs/line_bead-mpm-*/record.json")):
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    (first,) = tmp_path.glob("runs/line_bead-mpm-*/record.json")
+    stamp = first.stat().st_mtime
+    assert not list(tmp_path.glob("runs/line_bead-pbd-*/record.json"))
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+    assert first.stat().st_mtime == stamp
+    assert len(list(tmp_path.glob("runs/*/record.json"))) == 3
+
+
+def test_a_run_that_cannot_make_it_is_a_timeout_not_a_result(tmp_path):
+    done = fluidbench(
+        "run", "line_bead", *TINY, "--set", "material.viscosity=1e4", "--wall-limit", "3", "--out", str(tmp_path)
+    )
+    (record,) = tmp_path.glob("runs/*/record.json")
+    record = json.loads(record.read_text())
+    assert done.returncode == 1 and record["verdict"] == "timeout" and record["measures"] == {}
+    assert "wall-limit" in done.stdout
+
+
+def test_list_show_and_doctor_answer():
+    assert "line_bead" in fluidbench("list").stdout and "mpm" in fluidbench("list").stdout
+    shown = fluidbench("show", "dam_break").stdout
+    assert "wave speed" in shown and "acoustic" in shown and "substeps" in shown
+    assert "warp-lang" in fluidbench("doctor").stdout

@@ -1,0 +1,51 @@
+"""Shared by all tests: a quiet Warp, small scenarios, and the list of methods under contract."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+
+from fluidbench.library import validate
+from fluidbench.scenario import Scenario
+
+wp.config.quiet = True
+G = 9.81
+
+
+def scenario(**table: Any) -> Scenario:
+    """A scenario from keyword tables, over a box of water in a unit domain."""
+    base: dict[str, Any] = {
+        "name": "test",
+        "domain": {"lower": [0.0, 0.0, 0.0], "upper": [0.2, 0.2, 0.2]},
+        "material": {"density": 1000.0},
+        "bodies": [{"kind": "box", "center": [0.05, 0.05, 0.05], "size": [0.08, 0.08, 0.08]}],
+        "duration": 0.01,
+        "spacing": 0.01,
+    }
+    return validate({**base, **table}, "test")
+
+
+def bead(**table: Any) -> Scenario:
+    """A short line of paste, 6 particles across."""
+    base: dict[str, Any] = {
+        "domain": {"lower": [-0.02, -0.02, 0.0], "upper": [0.05, 0.02, 0.025]},
+        "material": {"density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "yield_stress": 60.0,
+                     "plastic_viscosity": 1.0},
+        "bodies": [],
+        "nozzle": {"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.010},
+        "toolpath": {"kind": "line", "start": [0.0, 0.0], "end": [0.03, 0.0], "speed": 0.1},
+        "duration": 0.1,
+        "spacing": 0.002,
+    }  # fmt: skip
+    return scenario(**{**base, **table})
+
+
+def center_of_mass(frame: dict[str, np.ndarray]) -> np.ndarray:
+    m = frame["mass"].astype(float)
+    return m @ frame["position"].astype(float) / m.sum()
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> None:
+    wp.config.quiet = True

@@ -1,0 +1,65 @@
+"""A fourth method, as small as the contract allows: particles fly and stop at walls."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from fluidbench.solver import Config, Solver
+from fluidbench.timestep import Bound
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def fly(
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    gravity: wp.array(dtype=wp.vec3),
+    held: wp.array(dtype=int),
+    floor: float,
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+):
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        v = velocity[i]
+        if held[i] == 0:
+            v += dt[world] * gravity[world]
+        x = position[i] + dt[world] * v
+        if x[2] < floor:
+            x = wp.vec3(x[0], x[1], floor)
+            v = wp.vec3(0.0, 0.0, 0.0)
+        position[i] = x
+        velocity[i] = v
+
+
+class Ballistic(Solver):
+    """No interaction at all."""
+
+    name = "ballistic"
+    paradigm = "projectiles"
+    features: ClassVar = frozenset()
+    Config: ClassVar = Config
+    passes = ("fly",)
+
+    @classmethod
+    def bounds(cls, scenario, config, speed) -> list[Bound]:
+        return [Bound("advective", scenario.spacing / speed, "d / v", "one spacing")]
+
+    def __init__(self, scene, pool, config, backend="warp") -> None:
+        self.scene, self.pool, self.config = scene, pool, config
+
+    def substep(self) -> None:
+        pool, scene = self.pool, self.scene
+        floor = float(scene.scenario.domain.lower[2])
+        inputs: list[Any] = [pool.capacity, pool.count, scene.dt, scene.gravity, pool.held, floor]
+        wp.launch(fly, pool.size, [*inputs, pool.position, pool.velocity], device=scene.device)
+
+    def densities(self) -> np.ndarray:
+        return np.full(self.pool.size, self.scene.scenario.material.density)
+
+    def footprint(self) -> dict[str, int]:
+        return {}
