@@ -23,7 +23,7 @@ def inspect(
 ):  # fmt: skip
     """Per world: largest speed, number of non-finite particles, kinetic and potential energy."""
     world, lane = wp.tid()
-    fastest, bad = float(0.0), 0
+    fastest, bad = float(0.0), int(0)
     kinetic, potential = wp.float64(0.0), wp.float64(0.0)
     i = lane
     while i < count[world]:

@@ -115,6 +115,7 @@ def _position(node: list[Any], part: str, key: str) -> int:
 def _explain(item: Any, where: str) -> str:
     """One pydantic error in words."""
     path = [str(part) for part in item["loc"] if not str(part).startswith(("literal[", "function-", "tagged"))]
+    path = path or [str(part) for part in item["loc"]]
     key = ".".join(path) or "scenario"
     if item["type"] == "extra_forbidden":
         return f"{where}: unknown key '{key}'{suggestion(path[-1], _fields_at(path[:-1]))}"

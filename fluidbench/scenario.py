@@ -239,7 +239,7 @@ class Scenario(Model):
 
     @cached_property
     def reference_speed(self) -> float:
-        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, or sqrt(2 g H) of free fall."""
+        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, or sqrt(g H)."""
         g = float(np.linalg.norm(self.acceleration))
         speeds, height = [1e-3], 0.0
         if self.nozzle is not None and self.toolpath is not None and self.track is not None:

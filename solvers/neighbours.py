@@ -139,8 +139,8 @@ def has_choice(near: wp.vec3i, code: int):
 @wp.func
 def opposite(code: int):
     """The code that undoes a periodic shift."""
-    back = 0
-    power = 1
+    back = int(0)
+    power = int(1)
     for axis in range(3):
         back += ((3 - image_code(code, axis)) % 3) * power
         power *= 3
@@ -162,14 +162,14 @@ def fill_lists(
     """
     i = wp.tid()
     world = group[i]
-    n = 0
+    n = int(0)
     if world < worlds:
         x = position[i]
         listed[i] = x
         reach2 = reach * reach
         shifts = near_faces(box, x, reach, True)
         mirrors = near_faces(box, x, reach, False)
-        most_shifts, most_mirrors = 1, 1
+        most_shifts, most_mirrors = int(1), int(1)
         if shifts[0] + shifts[1] + shifts[2] > 12:
             most_shifts = 27
         if mirrors[0] + mirrors[1] + mirrors[2] > 12:

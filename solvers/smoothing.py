@@ -22,6 +22,13 @@ def poly6(r2: float, support: float):
     return 315.0 / (64.0 * pi * h3 * h3 * h3) * d * d * d
 
 
+def spiky(r: float, support: float):
+    """Spiky kernel [1/m^3], support H: its peak keeps particles from clumping. Desbrun & Gascuel 1996."""
+    d = max(support - r, 0.0)
+    h3 = support * support * support
+    return 15.0 / (pi * h3 * h3) * d * d * d
+
+
 def spiky_slope(r: float, support: float):
     """(dW/dr) [1/m^4] of the spiky kernel, support H. Mueller et al. 2003."""
     d = max(support - r, 0.0)

@@ -15,8 +15,8 @@ FINE = 4  # sections are sampled this many times finer than the field
 class Deposit:
     """Volume fraction `fill` (nx, ny, nz) in cells of edge `spacing` [m]; cell (0, 0, 0) is centred at `origin` [m].
 
-    A length read from it is known to about a quarter of `spacing`; the spline's blur draws a surface of curvature
-    radius R inwards by spacing^2 / (8 R).
+    Smooth surfaces are known to about a quarter of `spacing`, extents to one `spacing`; the spline's blur draws a
+    surface of curvature radius R inwards by spacing^2 / (8 R).
     """
 
     origin: np.ndarray

@@ -28,7 +28,7 @@ class ConfigMPM(Config):
     volume_feedback: Annotated[float, Field(ge=0, le=1)] = Field(
         0.1, description="rate, in c / dx, at which overlap seen on the grid corrects the integrated volume"
     )
-    volume_tolerance: Annotated[float, Field(ge=0)] = Field(0.0, description="overlap that is left alone")
+    volume_tolerance: Annotated[float, Field(ge=0)] = Field(1e-3, description="overlap that is left alone")
     blocks_per_particle: Annotated[float, Field(gt=0, le=8)] = Field(0.5, description="grid blocks to preallocate")
 
 

@@ -11,11 +11,12 @@ from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
 
 from ..bind import warp_func
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, contained, image_position, image_velocity
-from ..smoothing import poly6, spiky_slope
+from ..smoothing import poly6, spiky, spiky_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 kernel = warp_func(poly6)
+summed = warp_func(spiky)
 gradient = warp_func(spiky_slope)
 
 
@@ -25,10 +26,9 @@ class Numbers:
 
     support: float  # kernel radius H [m]
     spacing: float  # [m]
-    weight: float  # makes the kernel sum of volumes exactly 1 on a lattice at rest [-]
+    weight: float  # makes the density sum exactly 1 on a lattice at rest [-]
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
-    anti_clumping: float  # strength k of the artificial pressure of eq. 13 [-]
     sweeps: int  # shear sweeps per substep
 
 
@@ -68,11 +68,15 @@ def multipliers(
     # outputs
     multiplier: wp.array(dtype=float), fill: wp.array(dtype=float),
 ):  # fmt: skip
-    """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper)."""
+    """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper).
+
+    Density is summed with the kernel whose slope is used, so that the constraint and its gradient agree; the paper
+    sums with poly6, whose flat top lets particles pair.
+    """
     i = wp.tid()
     if i % capacity < count[i / capacity]:
         x = position[i]
-        dense = volume[i] * kernel(0.0, num.support)
+        dense = volume[i] * summed(0.0, num.support)
         own = wp.vec3(0.0, 0.0, 0.0)
         squares = float(0.0)
         for k in range(lists.number[i]):
@@ -84,8 +88,8 @@ def multipliers(
                 xj = image_position(box, xj, code)
             r = x - xj
             r2 = wp.dot(r, r)
-            dense += volume[j] * kernel(r2, num.support)
             distance = wp.sqrt(r2)
+            dense += volume[j] * summed(distance, num.support)
             g = (volume[j] * num.weight * gradient(distance, num.support) / wp.max(distance, 1.0e-9)) * r
             own += g
             squares += wp.dot(g, g)
@@ -103,13 +107,11 @@ def correct(
     # outputs
     correction: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """Position correction (eq. 14), as one simultaneous Jacobi step, with artificial pressure against clumping."""
+    """Position correction (eq. 12), as one simultaneous Jacobi step."""
     i = wp.tid()
     if i % capacity < count[i / capacity] and held[i] == 0:
         x = position[i]
         shift = wp.vec3(0.0, 0.0, 0.0)
-        near = 0.2 * num.support
-        inv_w = 1.0 / kernel(near * near, num.support)
         for k in range(lists.number[i]):
             entry = lists.entries[i * lists.row + k * lists.column]
             j = entry & INDEX_MASK
@@ -120,9 +122,7 @@ def correct(
             r = x - xj
             distance = wp.length(r)
             g = volume[j] * num.weight * gradient(distance, num.support) / wp.max(distance, 1.0e-9)
-            ratio = kernel(distance * distance, num.support) * inv_w
-            repulsion = num.anti_clumping * ratio * ratio * ratio * ratio
-            shift += ((multiplier[i] + multiplier[j] - repulsion) * g) * r
+            shift += ((multiplier[i] + multiplier[j]) * g) * r
         correction[i] = (num.over_relaxation * num.spacing * num.spacing) * shift
 
 

@@ -15,7 +15,7 @@ from fluidbench.timestep import Bound
 from .. import neighbours
 from ..neighbours import FAULT_NEIGHBOURS, Neighbours
 from ..order import CellOrder
-from ..smoothing import poly6
+from ..smoothing import spiky
 from . import kernels_warp as kernels
 
 
@@ -25,7 +25,6 @@ class ConfigPBD(Config):
     advance: Annotated[float, Field(gt=0, le=1)] = Field(0.125, description="accuracy: spacings moved per substep")
     relaxation: Annotated[float, Field(gt=0)] = Field(0.02, description="constraint force mixing epsilon")
     over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
-    anti_clumping: Annotated[float, Field(ge=0)] = Field(0.01, description="artificial pressure k against clumping")
     shear_sweeps: Annotated[int, Field(ge=1, le=64)] = Field(8, description="XSPH sweeps per substep")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
@@ -79,7 +78,6 @@ class SolverPBD(Solver):
         self.num.spacing = scene.spacing
         self.num.weight = 1.0 / _lattice_sum(config.support_ratio)
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
-        self.num.anti_clumping = config.anti_clumping
         self.num.sweeps = config.shear_sweeps
         with wp.ScopedDevice(scene.device):
             self.start = wp.zeros(pool.size, dtype=wp.vec3)
@@ -202,4 +200,4 @@ def _lattice_sum(support_ratio: float) -> float:
     n = int(support_ratio) + 1
     axis = np.arange(-n, n + 1)
     r2 = sum(np.square(g) for g in np.meshgrid(axis, axis, axis))
-    return float(sum(poly6(float(value), support_ratio) for value in np.ravel(r2)))
+    return float(sum(spiky(float(value), support_ratio) for value in np.sqrt(np.ravel(r2))))

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 TINY = [
-    "--set", "spacing=0.003", "--set", "duration=0.12", "--set", "output_interval=0.03", "--set", "toolpath.end=[0.03, 0.0]",
-    "--set", "domain.upper=[0.06, 0.03, 0.03]",
+    "--set", "spacing=0.003", "--set", "duration=0.12", "--set", "output_interval=0.03",
+    "--set", "toolpath.end=[0.03, 0.0]", "--set", "domain.upper=[0.06, 0.03, 0.03]",
 ]  # fmt: skip
 
 

@@ -85,6 +85,8 @@ def test_flow_stress_solves_its_equation(trial, threshold, consistency, index, s
         return
     assert threshold * (1 - 1e-9) <= tau <= trial
     rate = (trial - tau) / stiffness
+    if rate * stiffness < 1e-9 * trial:  # the difference of two floats says nothing of the rate
+        return
     assert threshold + consistency * rate**index == pytest.approx(tau, rel=2e-3, abs=2e-3 * (trial - threshold))
 
 

@@ -133,4 +133,4 @@ def test_schedule_is_the_same_for_all_methods_and_divides_outputs():
 
 def test_sound_speed_follows_the_fastest_expected_speed():
     s = scenario()
-    assert s.liquid_sound_speed == pytest.approx(10 * math.sqrt(2 * 9.81 * 0.09), rel=1e-6)
+    assert s.liquid_sound_speed == pytest.approx(10 * math.sqrt(9.81 * 0.09), rel=1e-6)
