@@ -97,6 +97,7 @@ class SolverMPM(Solver):
             self.active = wp.zeros(1, dtype=int)
             self.raw = wp.empty(slots * 64, dtype=wp.vec4)
             self.moving = wp.empty(slots * 64, dtype=wp.vec4)
+        self.started = False
         self.order = CellOrder(scene, pool, self.grid.dx, shift=0.5)  # particles of one cell share their 27 nodes
         self.node_lanes = min(scene.lanes, slots * 64)
 
@@ -116,6 +117,20 @@ class SolverMPM(Solver):
             [self.table, self.block_of, self.active, pool.fault],
             device=device,
         )
+
+        if not self.started:
+            self._start_affine()
+
+    def _start_affine(self) -> None:
+        """Gather the affine field of the initial velocities: from zero, the first step would be a lossy PIC step.
+
+        At dt = 0, which the scene has until its first plan, the passes change nothing but `affine` and the velocity.
+        """
+        self.started = True
+        velocity = wp.clone(self.pool.velocity)
+        for name in self.passes:
+            getattr(self, name)()
+        wp.copy(self.pool.velocity, velocity)
 
     def substep(self) -> None:
         for name in self.passes:

@@ -31,6 +31,7 @@ class Smoothing:
 
     h: float  # smoothing length [m]
     spacing: float  # [m]
+    viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
     lattice: float  # makes the second moment of a lattice exactly its density [-]
     sound_speed: float  # longitudinal wave speed [m/s]
     density_diffusion: float  # delta [-]
@@ -228,7 +229,9 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 scalar = shock * wp.min(ur, 0.0) / (r2 + tiny)
                 if wp.static(viscous):
                     # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
-                    scalar += 10.0 * phase.viscosity * ur / ((r2 + 0.01 * tiny) * rho * density[j])
+                    scalar += (
+                        10.0 * num.viscous_lattice * phase.viscosity * ur / ((r2 + 0.01 * tiny) * rho * density[j])
+                    )
                 push = wp.vec3(0.0, 0.0, 0.0)
                 if wp.static(strength):
                     n = sn + stress_normal[j]

@@ -89,7 +89,8 @@ class SolverSPH(Solver):
         self.num = kernels.Smoothing()
         self.num.h = config.smoothing(scene.elastic) * scene.spacing
         self.num.spacing = scene.spacing
-        self.num.lattice = 1.0 / lattice_moment(config.smoothing(scene.elastic))
+        second, fourth = lattice_moments(config.smoothing(scene.elastic))
+        self.num.lattice, self.num.viscous_lattice = 1.0 / second, 1.0 / fourth
         self.num.sound_speed = scene.wave_speed
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.elastic)
@@ -200,8 +201,11 @@ class SolverSPH(Solver):
         return own | self.neighbours.footprint()
 
 
-def lattice_moment(ratio: float) -> float:
-    """One third of the trace of sum V r r^T |W'| / r on a unit lattice, h = ratio; 1 in the continuum."""
+def lattice_moments(ratio: float) -> tuple[float, float]:
+    """Sums over a unit lattice with h = ratio, each 1 in the continuum: the second moment -sum V r^2 W' / (3 r), which
+    scales summed density, and the fourth -5 sum V x^2 z^2 W' / r^3, which scales viscosity in shear."""
     axis = np.arange(-int(2 * ratio) - 1, int(2 * ratio) + 2)
-    r2 = sum(np.square(g) for g in np.meshgrid(axis, axis, axis)).ravel()
-    return -sum(value * wendland_slope(math.sqrt(value) / ratio, ratio) for value in r2) / 3.0
+    x, y, z = (g.ravel() for g in np.meshgrid(axis, axis, axis))
+    r2 = x * x + y * y + z * z
+    slope = np.array([wendland_slope(math.sqrt(value) / ratio, ratio) for value in r2])
+    return float(-(slope * r2).sum() / 3.0), float(-5.0 * (slope * x * x * z * z / np.maximum(r2, 1)).sum())
