@@ -99,7 +99,7 @@ class SolverMPM(Solver):
             self.moving = wp.empty(slots * 64, dtype=wp.vec4)
         self.started = False
         self.order = CellOrder(scene, pool, self.grid.dx, shift=0.5)  # particles of one cell share their 27 nodes
-        self.node_lanes = min(scene.lanes, slots * 64)
+        self.node_lanes = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
 
     def refresh(self) -> None:
         pool, device = self.pool, self.scene.device
