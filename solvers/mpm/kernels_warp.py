@@ -6,13 +6,14 @@ Quadratic B-splines; D = dx^2 / 4, so the inverse inertia tensor is 4 / dx^2.
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, STICK, Phase
+from fluidbench.scene import Phase
 
 from .. import constitutive
 from ..bind import warp_func
 from ..smoothing import quadratic_spline
 from ..vector_access import add_vec4, in_company, load_vec4, run_of
-from .grid import FIRST, Grid, activate_stencil, first_node, node_of, raw_node, wrapped
+from .grid import FIRST, Grid, activate_stencil, first_node, node_of, wrapped
+from .walls import flipped, folded, grip, mirror, near_wall, plane_share, unbound, wall_kind, wall_velocity
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -20,8 +21,6 @@ pressure = warp_func(constitutive.pressure)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
-# Filling of a wall's node that a flat surface gives at gaps of 0.36 and 0.21 dx: contact grows between them.
-CONTACT_BEGINS, CONTACT_ENDS = wp.constant(0.5), wp.constant(0.7)
 
 
 @wp.kernel
@@ -174,169 +173,6 @@ def p2g(
                 w = wxy * wz[r]
                 node = wp.where(on, slot * 64 + lx[o] + ly[q] + lz[r], -1)
                 add_vec4(raw, node, wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m), run)
-
-
-@wp.func
-def grip(
-    grid: Grid, world: int, node: wp.vec3i, axis: int, rest_density: float, table: wp.array(dtype=int),
-    raw: wp.array(dtype=wp.vec4),
-):  # fmt: skip
-    """How far, from 0 to 1, the wall nearest to a node on this axis acts on its column of nodes.
-
-    Slip walls always act: they are symmetry planes. Rough walls act where material has arrived, as the node on the
-    wall fills from CONTACT_BEGINS to CONTACT_ENDS; otherwise a falling body would be stopped, and squeezed, up to
-    1.5 dx above the floor (Nairn 2013, CMES 92:271, on contact by separation instead of by velocity).
-    """
-    plane = node
-    kind = grid.lower_kind[axis]
-    plane[axis] = FIRST
-    if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
-        kind = grid.upper_kind[axis]
-        plane[axis] = FIRST + grid.cells[axis]
-    hold = float(1.0)
-    if kind == PERIODIC:
-        hold = 0.0
-    elif kind == STICK or kind == FRICTION:
-        filled = 2.0 * raw_node(grid, world, plane, table, raw)[3] * grid.inv_dx * grid.inv_dx * grid.inv_dx
-        hold = wp.clamp((filled / rest_density - CONTACT_BEGINS) / (CONTACT_ENDS - CONTACT_BEGINS), 0.0, 1.0)
-    return hold
-
-
-@wp.func
-def mirror(node: int, cells: int, lower_kind: int, upper_kind: int):
-    """The node in front of a mirroring wall (slip, stick) whose image this node is; itself elsewhere."""
-    inside = node
-    if node < FIRST and lower_kind != FRICTION and lower_kind != PERIODIC:
-        inside = 2 * FIRST - node
-    if node > FIRST + cells and upper_kind != FRICTION and upper_kind != PERIODIC:
-        inside = 2 * (FIRST + cells) - node
-    return inside
-
-
-@wp.func
-def image(node: int, cells: int, lower_kind: int, upper_kind: int):
-    """The ghost node whose content a mirroring wall folds onto this one; the node itself where there is none."""
-    behind = node
-    if node == FIRST + 1 and lower_kind != FRICTION and lower_kind != PERIODIC:
-        behind = FIRST - 1
-    if node == FIRST + cells - 1 and upper_kind != FRICTION and upper_kind != PERIODIC:
-        behind = FIRST + cells + 1
-    return behind
-
-
-@wp.func
-def flipped(v: wp.vec4, axis: int, kind: int):
-    """A momentum or velocity seen in a wall: slip mirrors the normal component, stick turns all of them round."""
-    out = v
-    if kind == STICK:
-        out = wp.vec4(-v[0], -v[1], -v[2], v[3])
-    else:
-        out[axis] = -v[axis]
-    return out
-
-
-@wp.func
-def wall_kind(node: int, lower_kind: int, upper_kind: int, cells: int):
-    """Kind of the wall nearest to a node."""
-    kind = upper_kind
-    if 2 * (node - FIRST) < cells:
-        kind = lower_kind
-    return kind
-
-
-@wp.func
-def rub(v: wp.vec3, axis: int, outward: float, friction: float):
-    """Unilateral contact with Coulomb friction: no motion into the wall, tangential loss up to friction times that."""
-    out = v
-    into = outward * v[axis]
-    if into > 0.0:
-        out[axis] = 0.0
-        slide = wp.length(out)
-        out = out * (1.0 - wp.min(friction * into / wp.max(slide, 1.0e-12), 1.0))
-    return out
-
-
-@wp.func
-def wall_velocity(grid: Grid, node: wp.vec3i, touching: wp.vec3i, v: wp.vec3):
-    """Impose the walls on the velocity of a node on, or behind, them."""
-    out = v
-    for axis in range(3):
-        i, last = node[axis], FIRST + grid.cells[axis]
-        lower, upper = grid.lower_kind[axis], grid.upper_kind[axis]
-        if touching[axis] == 1 and (i <= FIRST or i >= last):
-            kind = lower
-            friction = grid.lower_friction[axis]
-            outward = float(-1.0)
-            if i >= last:
-                kind = upper
-                friction = grid.upper_friction[axis]
-                outward = 1.0
-            if kind == STICK:
-                out = wp.vec3(0.0, 0.0, 0.0)
-            elif kind == FRICTION:
-                out = rub(out, axis, outward, friction)
-            else:
-                out[axis] = 0.0
-    return out
-
-
-@wp.func
-def folded(
-    grid: Grid, world: int, node: wp.vec3i, touching: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)
-):
-    """Momentum and mass of a node in front of mirroring walls, with what was scattered behind them folded back."""
-    total = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    other = wp.vec3i(0, 0, 0)
-    for axis in range(3):
-        other[axis] = node[axis]
-        if touching[axis] == 1:
-            other[axis] = image(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
-    for combination in range(8):
-        at = node
-        valid = bool(True)
-        for axis in range(3):
-            if ((combination >> axis) & 1) == 1:
-                valid = valid and other[axis] != node[axis]
-                at[axis] = other[axis]
-        if valid:
-            value = raw_node(grid, world, at, table, raw)
-            for axis in range(3):
-                if ((combination >> axis) & 1) == 1:
-                    kind = wall_kind(at[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
-                    value = flipped(value, axis, kind)
-            total += value
-    return total
-
-
-@wp.func
-def near_wall(grid: Grid, node: wp.vec3i):
-    """Whether a node is within one cell of a wall, in front or behind."""
-    near = bool(False)
-    for axis in range(3):
-        walled = grid.lower_kind[axis] != PERIODIC
-        if walled and (node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1):
-            near = True
-    return near
-
-
-@wp.func
-def plane_share(grid: Grid, node: wp.vec3i):
-    """What the mass of a node on a wall must be multiplied by: only half (a quarter, ...) of its cell is inside."""
-    share = float(1.0)
-    for axis in range(3):
-        walled = grid.lower_kind[axis] != PERIODIC
-        if walled and (node[axis] == FIRST or node[axis] == FIRST + grid.cells[axis]):
-            share *= 2.0
-    return share
-
-
-@wp.func
-def unbound(raw: wp.vec4, gain: wp.vec3, density: float):
-    """A node's velocity and density where no wall acts."""
-    free = wp.vec4(0.0, 0.0, 0.0, density)
-    if raw[3] > 0.0:
-        free = wp.vec4(raw[0] / raw[3] + gain[0], raw[1] / raw[3] + gain[1], raw[2] / raw[3] + gain[2], density)
-    return free
 
 
 @wp.kernel
