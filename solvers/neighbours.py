@@ -19,6 +19,16 @@ ROOM = 1.7  # how much denser than a lattice matter may get before its lists ove
 WALL_INSET = wp.constant(0.2)  # closest approach to a wall, in particle spacings; at rest the first layer is at 0.5
 
 
+@wp.struct
+class Lists:
+    """Entry k of particle i is entries[i * row + k * column], for k < number[i]."""
+
+    entries: wp.array(dtype=int)
+    number: wp.array(dtype=int)
+    row: int
+    column: int
+
+
 @wp.func
 def image_code(code: int, axis: int):
     """0, 1 or 2: which image the code means on one axis."""
@@ -223,6 +233,9 @@ class Neighbours:
             self.listed = wp.zeros(pool.size, dtype=wp.vec3)
             self.group = wp.zeros(pool.size, dtype=int)
             self.outdated = wp.ones(1, dtype=int)
+        self.lists = Lists()
+        self.lists.entries, self.lists.number = self.entries, self.number
+        self.lists.row, self.lists.column = self.row, self.column
 
     def refresh(self) -> None:
         """The pool was changed from outside: make the lists anew at the next substep."""

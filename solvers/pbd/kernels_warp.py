@@ -10,7 +10,7 @@ import warp as wp
 from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
 
 from ..bind import warp_func
-from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, contained, image_position, image_velocity
+from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky, spiky_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -30,14 +30,6 @@ class Numbers:
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
     sweeps: int  # shear sweeps per substep
-
-
-@wp.struct
-class Lists:
-    entries: wp.array(dtype=int)
-    number: wp.array(dtype=int)
-    row: int
-    column: int
 
 
 @wp.kernel

@@ -86,9 +86,7 @@ class SolverPBD(Solver):
             self.multiplier = wp.zeros(pool.size, dtype=float)
             self.fill = wp.ones(pool.size, dtype=float)
         self.neighbours = Neighbours(scene, pool, self.num.support, config.skin * scene.spacing)
-        self.pairs = kernels.Lists()
-        self.pairs.entries, self.pairs.number = self.neighbours.entries, self.neighbours.number
-        self.pairs.row, self.pairs.column = self.neighbours.row, self.neighbours.column
+        self.pairs = self.neighbours.lists
         self.order = CellOrder(scene, pool, self.num.support)
         self.shears = scene.elastic or scene.viscous or any(box_has_friction(s) for s in scene.scenarios)
 

@@ -14,7 +14,7 @@ from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
 
 from .. import constitutive
 from ..bind import warp_func
-from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, contained, face_kind, image_position, image_velocity
+from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, face_kind, image_position, image_velocity
 from ..smoothing import wendland, wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -41,14 +41,6 @@ class Smoothing:
 
 
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
-
-
-@wp.struct
-class Lists:
-    entries: wp.array(dtype=int)
-    number: wp.array(dtype=int)
-    row: int
-    column: int
 
 
 @wp.func

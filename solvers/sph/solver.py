@@ -111,9 +111,7 @@ class SolverSPH(Solver):
             self.stress_shear = wp.zeros(solid, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
         self.neighbours = Neighbours(scene, pool, 2.0 * self.num.h, config.skin * self.num.h)
-        self.pairs = kernels.Lists()
-        self.pairs.entries, self.pairs.number = self.neighbours.entries, self.neighbours.number
-        self.pairs.row, self.pairs.column = self.neighbours.row, self.neighbours.column
+        self.pairs = self.neighbours.lists
         self.order = CellOrder(scene, pool, self.num.h)
 
     def _rest_densities(self) -> None:
