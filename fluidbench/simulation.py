@@ -62,6 +62,8 @@ class Simulation:
         backend: str = "warp", config: Any = None, graphs: bool = True,
     ) -> None:  # fmt: skip
         solver_class = get_solver(method) if isinstance(method, str) else method
+        if backend != "warp":
+            raise UserError(f"no backend '{backend}'; there is warp")
         self.scene = Scene(scenarios, device)
         self.scenario = self.scene.scenario
         self.config = configure(solver_class, self.scenario) if config is None else config

@@ -1,6 +1,5 @@
 """What there is before anything runs: the resolved scenario with its needs, and the state of the machine."""
 
-import importlib.util
 import json
 import os
 import platform
@@ -77,8 +76,6 @@ def diagnosis() -> list[str]:
             lines.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             lines.append(f"{package} is MISSING: pip install {package}")
-    if importlib.util.find_spec("taichi") is None:
-        lines.append("taichi is not installed (second backend, optional): pip install 'fluidbench[taichi]'")
     return [*lines, *_devices()]
 
 

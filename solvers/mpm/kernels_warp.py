@@ -150,7 +150,7 @@ def p2g(
     bx, by, bz, lx, ly, lz = node_parts(grid, base)
     s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
     if on and wp.min(wp.min(wp.min(s0, s1), wp.min(s2, s3)), wp.min(wp.min(s4, s5), wp.min(s6, s7))) < 0:
-        fault[0] = FAULT_STENCIL
+        wp.atomic_or(fault, 0, FAULT_STENCIL)
         on = False
     run = run_of(wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1))
     if not on and not in_company():
