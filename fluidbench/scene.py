@@ -14,7 +14,7 @@ from .material import Material
 from .scenario import Friction, Scenario
 
 SLIP, STICK, PERIODIC, FRICTION = 0, 1, 2, 3
-NEVER_YIELDS = 1.0e30
+NEVER_YIELDS = wp.constant(1.0e30)
 
 
 @wp.struct

@@ -1,15 +1,17 @@
 """Position-based fluids (Macklin & Mueller 2013, ACM TOG 32:104) in Warp.
 
-One substep: predict, lists, then per iteration multipliers and correction, then velocity from the change of position,
-and shear sweeps that stand for viscosity and yield. There is no stress: what the material law asks for is mapped onto
-velocity smoothing as far as that goes (see `smoothing_weight`).
+One substep: predict, lists, then per iteration multipliers and correction, then velocity from the change of position.
+Elastic shear is a compliant constraint (XPBD, Macklin et al. 2016) whose multiplier is bounded by the yield stress: one
+Jacobi step a substep, `strain` and `pull`. Newtonian viscosity is mapped onto velocity smoothing (`smoothing_weight`).
 """
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
+from fluidbench.scene import FRICTION, NEVER_YIELDS, PERIODIC, Box, Phase
 
+from .. import constitutive
 from ..bind import warp_func
+from ..corrected import mirrored_stress, symmetric_inverse
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky, spiky_slope
 
@@ -18,6 +20,11 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 kernel = warp_func(poly6)
 summed = warp_func(spiky)
 gradient = warp_func(spiky_slope)
+strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
+
+
+FOLLOW = wp.constant(0.02)  # share of the gap between integrated and summed volume that a substep closes
+LEAN = wp.constant(0.5)  # how far the neighbourhood may lean to one side, over the support, and count as complete
 
 
 @wp.struct
@@ -30,6 +37,8 @@ class Numbers:
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
     sweeps: int  # shear sweeps per substep
+    calm: float  # share of the approach of neighbours that is damped in a substep, with shear stiffness [-]
+    stiffness: float  # largest shear modulus that one Jacobi step conveys, over rho (d / dt)^2 [-]
 
 
 @wp.kernel
@@ -156,17 +165,126 @@ def velocities(
 
 
 @wp.func
-def smoothing_weight(num: Numbers, phase: Phase, shear_rate: float, dt: float):
-    """XSPH coefficient of one sweep that acts like the material's viscosity: c = 22 nu dt / (sweeps H^2), at most 1.
+def conveyed_modulus(num: Numbers, modulus: float, density: float, dt: float):
+    """Modulus that acts at this dt [Pa]: 1 / M_eff = 1 / M + dt^2 / (stiffness rho d^2).
 
-    The material's apparent viscosity is viscosity + plastic_viscosity rate^(n-1) + yield_stress / rate, as far as it
-    has any; beyond c = 1 per sweep XSPH cannot go (validation C).
+    The XPBD multiplier -C / (S + 1 / (G dt^2)) of a strain constraint C with inverse mass S is that of an elastic
+    stress with this modulus: beyond what dt allows a stiffer material does not get stiffer.
     """
-    rate = wp.max(shear_rate, 1.0e-3)
-    eta = phase.viscosity
-    if phase.shear_modulus > 0.0:
-        eta += phase.plastic_viscosity * wp.pow(rate, phase.flow_index - 1.0) + phase.yield_stress / rate
-    c = 22.0 * eta / phase.density * dt / (num.support * num.support * float(num.sweeps))
+    most = num.stiffness * density * num.spacing * num.spacing / (dt * dt)
+    return modulus * most / (modulus + most)
+
+
+@wp.kernel
+def strain(
+    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float), velocity: wp.array(dtype=wp.vec3),
+    fill: wp.array(dtype=float),
+    # outputs
+    swelling: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+    stress: wp.array(dtype=wp.mat33),
+):  # fmt: skip
+    """Strain of the substep by the common material law, and the stress that answers it: the elastic deviator, and
+    in a solid tension where it has swelled; density constraints only push. What yields flows, which lets pushes without
+    pulls pass for swelling: it carries no isotropic tension."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        phase = phases[world, phase_of[i]]
+        x = position[i]
+        v = velocity[i]
+        slope = wp.mat33()
+        moment = wp.mat33()
+        lean = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(lists.number[i]):
+            entry = lists.entries[i * lists.row + k * lists.column]
+            j = entry & INDEX_MASK
+            code = entry >> INDEX_BITS
+            xj = position[j]
+            vj = velocity[j]
+            if code > 0:
+                xj = image_position(box, xj, code)
+                vj = image_velocity(box, vj, code)
+            r = x - xj
+            distance = wp.length(r)
+            g = volume[j] * gradient(distance, num.support) / wp.max(distance, 1.0e-9)
+            slope -= wp.outer(g * (v - vj), r)
+            moment -= wp.outer(g * r, r)
+            lean += g * r
+        correction = symmetric_inverse(moment)
+        slope = slope * correction
+        modulus = conveyed_modulus(num, phase.shear_modulus, phase.density, dt[world])
+        # The volume that is integrated follows the one that particles really fill, where neighbours surround it.
+        whole = wp.max(1.0 - wp.length(lean) * num.support / LEAN, 0.0)
+        volume_strain = swelling[i] + dt[world] * wp.trace(slope)
+        volume_strain += FOLLOW * whole * (-wp.log(wp.max(fill[i], 0.1)) - volume_strain)
+        swelling[i] = volume_strain
+        tension = float(0.0)
+        if phase.yield_stress >= NEVER_YIELDS:
+            tension = conveyed_modulus(num, phase.bulk_modulus, phase.density, dt[world]) * wp.max(volume_strain, 0.0)
+        b = elastic_normal[i]
+        s = elastic_shear[i]
+        if held[i] == 0:
+            b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
+                slope[0, 0], slope[0, 1], slope[0, 2], slope[1, 0], slope[1, 1], slope[1, 2], slope[2, 0], slope[2, 1],
+                slope[2, 2], b[0], b[1], b[2], s[0], s[1], s[2],
+                modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, dt[world],
+            )  # fmt: skip
+            b = wp.vec3(b_xx, b_yy, b_zz)
+            s = wp.vec3(b_xy, b_xz, b_yz)
+            elastic_normal[i] = b
+            elastic_shear[i] = s
+        mean = (b[0] + b[1] + b[2]) / 3.0
+        mean -= tension / modulus
+        strength = wp.mat33(b[0] - mean, s[0], s[1], s[0], b[1] - mean, s[2], s[1], s[2], b[2] - mean)
+        stress[i] = (modulus / phase.density) * (strength * correction)
+
+
+@wp.kernel
+def pull(
+    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
+    held: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float),
+    stress: wp.array(dtype=wp.mat33), velocity: wp.array(dtype=wp.vec3),
+    # outputs
+    smoothed: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """Velocity under the stress of the particle and its neighbours, and damping along their lines of centres."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        x = position[i]
+        v = velocity[i]
+        own = stress[i]
+        a = wp.vec3(0.0, 0.0, 0.0)
+        damping = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(lists.number[i]):
+            entry = lists.entries[i * lists.row + k * lists.column]
+            j = entry & INDEX_MASK
+            code = entry >> INDEX_BITS
+            xj = position[j]
+            vj = velocity[j]
+            other = stress[j]
+            if code > 0:
+                xj = image_position(box, xj, code)
+                vj = image_velocity(box, vj, code)
+                other = mirrored_stress(box, other, code)
+            r = x - xj
+            distance = wp.length(r)
+            g = volume[j] * gradient(distance, num.support) / wp.max(distance, 1.0e-9)
+            a += (own + other) * (g * r)
+            w = volume[j] * num.weight * kernel(distance * distance, num.support)
+            damping -= (w * wp.dot(v - vj, r) / wp.max(distance * distance, 1.0e-18)) * r
+        if held[i] == 0:
+            v += dt[world] * a + num.calm * damping
+        smoothed[i] = v
+
+
+@wp.func
+def smoothing_weight(num: Numbers, phase: Phase, dt: float):
+    """XSPH coefficient of one sweep that acts like the material's viscosity: c = 22 nu dt / (sweeps H^2), at most 1
+    (validation C)."""
+    c = 22.0 * phase.viscosity / phase.density * dt / (num.support * num.support * float(num.sweeps))
     return wp.min(c, 1.0)
 
 
@@ -178,7 +296,7 @@ def shear(
     # outputs
     smoothed: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """One XSPH sweep (eq. 17) with a weight from the local shear rate."""
+    """One XSPH sweep (eq. 17)."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world]:
@@ -186,8 +304,6 @@ def shear(
         x = position[i]
         v = velocity[i]
         mean = wp.vec3(0.0, 0.0, 0.0)
-        spin = wp.mat33()
-        moment = float(0.0)
         total = volume[i] * num.weight * kernel(0.0, num.support)
         for k in range(lists.number[i]):
             entry = lists.entries[i * lists.row + k * lists.column]
@@ -200,18 +316,11 @@ def shear(
                 vj = image_velocity(box, vj, code)
             r = xj - x
             w = volume[j] * num.weight * kernel(wp.dot(r, r), num.support)
-            u = vj - v
-            mean += w * u
-            spin += wp.outer(w * u, r)
-            moment += w * wp.dot(r, r)
+            mean += w * (vj - v)
             total += w
-        # least-squares velocity gradient for an isotropic neighbourhood: sum w u r^T / (sum w r^2 / 3)
-        g = spin * (3.0 / wp.max(moment, 1.0e-20))
-        rate = 0.5 * (g + wp.transpose(g))
-        shear_rate = wp.sqrt(2.0 * wp.ddot(rate, rate))
         out = v
         if held[i] == 0:
-            c = smoothing_weight(num, phase, shear_rate, dt[world])
+            c = smoothing_weight(num, phase, dt[world])
             out = v + (c / wp.max(total, 1.0)) * mean
         smoothed[i] = out
 
@@ -219,14 +328,15 @@ def shear(
 @wp.kernel
 def rub(
     box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
-    spacing: float, gravity: wp.array(dtype=wp.vec3), smoothed: wp.array(dtype=wp.vec3),
-    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3),
+    spacing: float, gravity: wp.array(dtype=wp.vec3), position: wp.array(dtype=wp.vec3),
+    # outputs
+    velocity: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """Take over the smoothed velocity; particles touching a friction wall lose tangential speed by Coulomb's law."""
+    """Particles touching a friction wall lose tangential speed by Coulomb's law."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == 0:
-        v = smoothed[i]
+        v = velocity[i]
         for axis in range(3):
             lower = box.lower_kind[axis] == FRICTION and position[i][axis] - box.lower[axis] < spacing
             upper = box.upper_kind[axis] == FRICTION and box.upper[axis] - position[i][axis] < spacing

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from fluidbench.particles import Pool
 from fluidbench.scenario import Scenario
-from fluidbench.scene import Scene
+from fluidbench.scene import FRICTION, Scene
 from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound
 
@@ -21,11 +21,15 @@ from . import kernels_warp as kernels
 
 class ConfigPBD(Config):
     support_ratio: Annotated[float, Field(ge=2.0, le=4.0)] = Field(2.4, description="kernel radius H over spacing")
-    iterations: Annotated[int, Field(ge=1, le=200)] = Field(3, description="density iterations per substep")
+    iterations: Annotated[int, Field(ge=1, le=200)] = Field(5, description="density iterations per substep")
     advance: Annotated[float, Field(gt=0, le=1)] = Field(0.125, description="accuracy: spacings moved per substep")
-    relaxation: Annotated[float, Field(gt=0)] = Field(0.02, description="constraint force mixing epsilon")
+    relaxation: Annotated[float, Field(gt=0)] = Field(0.2, description="constraint force mixing epsilon")
     over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
     shear_sweeps: Annotated[int, Field(ge=1, le=64)] = Field(8, description="XSPH sweeps per substep")
+    shear_stiffness: Annotated[float, Field(gt=0, le=2)] = Field(
+        0.5, description="largest shear modulus that a substep conveys, over rho (d / dt)^2"
+    )
+    calm: Annotated[float, Field(ge=0, le=1)] = Field(0.05, description="damping along lines of centres, in solids")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
 
@@ -36,14 +40,14 @@ def largest_viscosity(scenario: Scenario, config: ConfigPBD, dt: float) -> float
 
 
 class SolverPBD(Solver):
-    """Position-based fluids with one-sided density constraints and XSPH for viscosity and yield."""
+    """Position-based fluids: one-sided density constraints, compliant shear bounded by yield, XSPH for viscosity."""
 
     name = "pbd"
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
-    features = frozenset({Feature.VISCOSITY, Feature.FRICTION, Feature.PERIODIC})
+    features = frozenset(Feature) - {Feature.PRESSURE}
     Config: ClassVar = ConfigPBD
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
-    passes = ("predict", "lists", "multipliers", "correct", "apply", "velocities", "shear", "rub")
+    passes = ("predict", "lists", "multipliers", "correct", "apply", "velocities", "strain", "pull", "shear", "rub")
 
     typical_rate, typical_bytes = 1.2e5, 900.0
 
@@ -51,15 +55,18 @@ class SolverPBD(Solver):
     def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
         m, words = scenario.material, []
         dt = min(bound.dt for bound in cls.bounds(scenario, config, scenario.reference_speed))
-        most = largest_viscosity(scenario, config, min(dt, scenario.schedule[0]))
+        dt = min(dt, scenario.schedule[0])
+        most = largest_viscosity(scenario, config, dt)
         if m.viscosity > most:
             words.append(f"viscosity {m.viscosity:g} Pa s acts like at most {most:.3g} Pa s (XSPH at this dt)")
-        if m.youngs_modulus is not None:
-            words.append("no elastic shear stress: a constraint is met or not, whatever Young's modulus says")
-        if m.flow_threshold > 0:
+        stiffest = config.shear_stiffness * m.density * (scenario.spacing / dt) ** 2
+        if m.shear_modulus > 0.1 * stiffest:
             words.append(
-                f"yield stress becomes an apparent viscosity of at most {most:.3g} Pa s: it creeps, never rests"
+                f"shear modulus {m.shear_modulus:.3g} Pa acts like {1 / (1 / m.shear_modulus + 1 / stiffest):.3g} Pa: "
+                "one compliant constraint a substep conveys no more"
             )
+        if 0.0 <= m.flow_threshold < np.inf and m.youngs_modulus is not None:
+            words.append("no isotropic tension: density constraints only push")
         return [*words, "pressure is whatever keeps rho <= rho0: no equation of state, no sound speed"]
 
     @classmethod
@@ -79,16 +86,23 @@ class SolverPBD(Solver):
         self.num.weight = 1.0 / _lattice_sum(config.support_ratio)
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
         self.num.sweeps = config.shear_sweeps
+        self.rubs = any(kind == FRICTION for kind in (*scene.box.lower_kind, *scene.box.upper_kind))
+        self.num.calm = config.calm
+        self.num.stiffness = config.shear_stiffness
+        if scene.elastic:
+            pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
+            pool.add_field("elastic_shear", wp.vec3)
+            pool.add_field("swelling", float)
         with wp.ScopedDevice(scene.device):
             self.start = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)
             self.smoothed = wp.zeros(pool.size, dtype=wp.vec3)
             self.multiplier = wp.zeros(pool.size, dtype=float)
             self.fill = wp.ones(pool.size, dtype=float)
+            self.stress = wp.zeros(pool.size if scene.elastic else 1, dtype=wp.mat33)
         self.neighbours = Neighbours(scene, pool, self.num.support, config.skin * scene.spacing)
         self.pairs = self.neighbours.lists
         self.order = CellOrder(scene, pool, self.num.support)
-        self.shears = scene.elastic or scene.viscous or any(box_has_friction(s) for s in scene.scenarios)
 
     def refresh(self) -> None:
         self.neighbours.refresh()
@@ -101,10 +115,14 @@ class SolverPBD(Solver):
             self.correct()
             self.apply()
         self.velocities()
-        if self.shears:
+        if self.scene.elastic:
+            self.strain()
+            self.pull()
+        if self.scene.viscous:
             for _ in range(self.config.shear_sweeps):
                 self.shear()
-                self.rub()
+        if self.rubs:
+            self.rub()
 
     def _launch(self, kernel: wp.Kernel, inputs: list[Any], outputs: list[Any]) -> None:
         wp.launch(kernel, self.pool.size, inputs, outputs, device=self.scene.device)
@@ -156,6 +174,25 @@ class SolverPBD(Solver):
             [pool.position, self.start, pool.velocity],
         )
 
+    def strain(self) -> None:
+        pool, scene = self.pool, self.scene
+        self._launch(
+            kernels.strain,
+            [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
+             pool.position, pool.volume, pool.velocity, self.fill],
+            [pool.swelling, pool.elastic_normal, pool.elastic_shear, self.stress],
+        )  # fmt: skip
+
+    def pull(self) -> None:
+        pool, scene = self.pool, self.scene
+        self._launch(
+            kernels.pull,
+            [self.num, scene.box, self.pairs, *self._active(), scene.dt, pool.held, pool.position, pool.volume,
+             self.stress, pool.velocity],
+            [self.smoothed],
+        )  # fmt: skip
+        wp.copy(pool.velocity, self.smoothed)
+
     def shear(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
@@ -164,13 +201,14 @@ class SolverPBD(Solver):
              pool.position, pool.volume, pool.velocity],
             [self.smoothed],
         )  # fmt: skip
+        wp.copy(pool.velocity, self.smoothed)
 
     def rub(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
             kernels.rub,
-            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.gravity, self.smoothed],
-            [pool.position, pool.velocity],
+            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.gravity, pool.position],
+            [pool.velocity],
         )
 
     def prepare(self) -> None:
@@ -185,12 +223,8 @@ class SolverPBD(Solver):
         return rest * np.maximum(self.fill.numpy(), 1.0)
 
     def footprint(self) -> dict[str, int]:
-        own = {name: getattr(self, name).capacity for name in ("start", "correction", "smoothed", "multiplier", "fill")}
-        return own | self.neighbours.footprint()
-
-
-def box_has_friction(scenario: Scenario) -> bool:
-    return any(not isinstance(wall, str) for wall in scenario.domain.walls.faces())
+        own = ("start", "correction", "smoothed", "multiplier", "fill", "stress")
+        return {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
 
 
 def _lattice_sum(support_ratio: float) -> float:

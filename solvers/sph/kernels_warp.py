@@ -1,8 +1,8 @@
 """Weakly compressible SPH in Warp: continuity density, delta-SPH diffusion, the common material law.
 
-One substep: lists, strain (continuity, velocity gradient, stress), force (momentum), move. The velocity gradient uses
-the corrected kernel gradient (Randles & Libersky 1996, CMAME 139:375), so that rigid rotation makes no strain; the
-momentum equation is the symmetric, momentum-conserving form (Monaghan 2005, Rep. Prog. Phys. 68:1703).
+One substep: lists, strain (continuity, velocity gradient, stress), force (momentum), move. Materials with shear
+stiffness use corrected gradients for strain and stress (see corrected.py), liquids the symmetric form of Monaghan
+(2005, Rep. Prog. Phys. 68:1703).
 """
 
 import functools
@@ -14,6 +14,7 @@ from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
 
 from .. import constitutive
 from ..bind import warp_func
+from ..corrected import mirrored_stress, symmetric_inverse
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, face_kind, image_position, image_velocity
 from ..smoothing import wendland, wendland_slope
 
@@ -41,31 +42,6 @@ class Smoothing:
 
 
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
-
-
-@wp.func
-def symmetric_inverse(m: wp.mat33):
-    """Inverse of a moment matrix; the identity where too few neighbours make it ill-conditioned."""
-    inverse = wp.identity(n=3, dtype=float)
-    if wp.determinant(m) > 0.3:
-        inverse = wp.inverse(m)
-    return inverse
-
-
-@wp.func
-def mirrored_shear(box: Box, s: wp.vec3, code: int):
-    """Off-diagonal stress (xy, xz, yz) seen in slip or friction walls: components along the normal change sign."""
-    out = s
-    fx, fy, fz = face_kind(box, code, 0), face_kind(box, code, 1), face_kind(box, code, 2)
-    sx, sy, sz = float(1.0), float(1.0), float(1.0)
-    if fx == 0 or fx == FRICTION:
-        sx = -1.0
-    if fy == 0 or fy == FRICTION:
-        sy = -1.0
-    if fz == 0 or fz == FRICTION:
-        sz = -1.0
-    out = wp.vec3(sx * sy * s[0], sx * sz * s[1], sy * sz * s[2])
-    return out
 
 
 @wp.kernel
@@ -97,8 +73,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
         density: wp.array(dtype=float), dynamic_density: wp.array(dtype=float),
         # outputs
         elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-        new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3),
-        stress_shear: wp.array(dtype=wp.vec3),
+        new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
     ):  # fmt: skip
         """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law."""
         i = wp.tid()
@@ -136,7 +111,8 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     lean += w * r
             if wp.static(strength):
                 # density from the corrected gradient, too: the same strain for pressure and for shear
-                gradient = gradient * symmetric_inverse(moment / rho) / rho
+                correction = symmetric_inverse(moment / rho)
+                gradient = gradient * correction / rho
                 inflow = -rho * wp.trace(gradient)
                 # The density that particles really have, against the one they integrate, which drifts: applied
                 # where the neighbourhood is complete (it leans to no side), or too crowded for any.
@@ -168,9 +144,10 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 g = phase.shear_modulus * rho / phase.density  # Cauchy from Kirchhoff: divide by J
                 mean = (b[0] + b[1] + b[2]) / 3.0
                 mean += p / g
-                normal = g * (b - wp.vec3(mean, mean, mean))
-                stress_shear[i] = (scale * g) * s
-                stress_normal[i] = scale * normal
+                # With the correction of its gradient stress does on the particles exactly the work of the strain.
+                stress[i] = (scale * g) * (
+                    wp.mat33(b[0] - mean, s[0], s[1], s[0], b[1] - mean, s[2], s[1], s[2], b[2] - mean) * correction
+                )
             else:
                 load[i] = scale * p
 
@@ -178,8 +155,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
         phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), gravity: wp.array(dtype=wp.vec3),
         position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
-        density: wp.array(dtype=float), load: wp.array(dtype=float), stress_normal: wp.array(dtype=wp.vec3),
-        stress_shear: wp.array(dtype=wp.vec3),
+        density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
         # outputs
         acceleration: wp.array(dtype=wp.vec3),
     ):  # fmt: skip
@@ -191,10 +167,9 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             v = velocity[i]
             rho = density[i]
             own = load[i]
-            sn, ss = wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0)
+            own_stress = wp.mat33()
             if wp.static(strength):
-                sn = stress_normal[i]
-                ss = stress_shear[i]
+                own_stress = stress[i]
             inv_h = 1.0 / num.h
             tiny = 0.01 * num.h * num.h
             shock = num.artificial_viscosity * num.h * num.sound_speed / rho
@@ -226,18 +201,13 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     )
                 push = wp.vec3(0.0, 0.0, 0.0)
                 if wp.static(strength):
-                    n = sn + stress_normal[j]
-                    t = stress_shear[j]
+                    other = stress[j]
                     if code > 0:
-                        t = mirrored_shear(box, t, code)
-                    t = ss + t
-                    push = wp.vec3(
-                        n[0] * r[0] + t[0] * r[1] + t[1] * r[2],
-                        n[1] * r[1] + t[0] * r[0] + t[2] * r[2],
-                        n[2] * r[2] + t[1] * r[0] + t[2] * r[1],
-                    )
+                        other = mirrored_stress(box, other, code)
+                    other += own_stress
+                    push = other * r
                     # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
-                    tension = wp.max(n[0] + n[1] + n[2], 0.0) / 3.0
+                    tension = wp.trace(other) / 3.0
                     if tension > 0.0:
                         ratio = kernel(q, num.h) * inv_w
                         scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio

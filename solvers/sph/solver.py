@@ -53,7 +53,7 @@ class SolverSPH(Solver):
     features = frozenset(Feature)
     Config: ClassVar = ConfigSPH
     passes = ("lists", "level", "strain", "force", "move")
-    OWN: ClassVar = ("new_density", "dynamic_density", "load", "stress_normal", "stress_shear", "acceleration")
+    OWN: ClassVar = ("new_density", "dynamic_density", "load", "stress", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
@@ -107,8 +107,7 @@ class SolverSPH(Solver):
             self.new_density = wp.zeros(pool.size, dtype=float)
             self.dynamic_density = wp.zeros(pool.size, dtype=float)
             self.load = wp.zeros(pool.size, dtype=float)
-            self.stress_normal = wp.zeros(solid, dtype=wp.vec3)
-            self.stress_shear = wp.zeros(solid, dtype=wp.vec3)
+            self.stress = wp.zeros(solid, dtype=wp.mat33)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
         self.neighbours = Neighbours(scene, pool, 2.0 * self.num.h, config.skin * self.num.h)
         self.pairs = self.neighbours.lists
@@ -150,7 +149,7 @@ class SolverSPH(Solver):
             self.kernels.strain,
             pool.size,
             [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.density, self.dynamic_density],
-            [*elastic, self.new_density, self.load, self.stress_normal, self.stress_shear],
+            [*elastic, self.new_density, self.load, self.stress],
             device=self.scene.device,
         )
 
@@ -160,7 +159,7 @@ class SolverSPH(Solver):
             self.kernels.force,
             pool.size,
             [*self._common(), self.scene.gravity, pool.position, pool.velocity, pool.mass, self.new_density, self.load,
-             self.stress_normal, self.stress_shear],
+             self.stress],
             [self.acceleration],
             device=self.scene.device,
         )  # fmt: skip
