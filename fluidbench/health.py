@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from .particles import Pool
-from .scene import Scene
+from .scene import Force, Scene, force_potential
 
 wp.set_module_options({"enable_backward": False})
 SPEED_FACTOR = 3.0  # matter faster than this many times (wave speed + reference speed) is no solution
@@ -17,7 +17,7 @@ ENERGY_FACTOR = 2.0  # kinetic energy beyond this many times what was ever suppl
 @wp.kernel
 def inspect(
     lanes: int, capacity: int, count: wp.array(dtype=int), position: wp.array(dtype=wp.vec3),
-    velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), gravity: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), force: wp.array(dtype=Force),
     # outputs
     top_speed: wp.array(dtype=float), broken: wp.array(dtype=int), energy: wp.array2d(dtype=wp.float64),
 ):  # fmt: skip
@@ -34,7 +34,7 @@ def inspect(
         if wp.isfinite(speed2) and wp.isfinite(wp.dot(x, x)):
             fastest = wp.max(fastest, speed2)
             kinetic += wp.float64(0.5 * mass[p] * speed2)
-            potential -= wp.float64(mass[p] * wp.dot(gravity[world], x))
+            potential -= wp.float64(mass[p] * force_potential(force[world], x))
         else:
             bad += 1
         i += lanes
@@ -72,7 +72,8 @@ class Health:
     def _mass_energy(self) -> float:
         """Most energy per unit mass that the scenario can turn into motion [J/kg]."""
         s = self.scene.scenario
-        reach = np.abs(np.asarray(s.domain.upper) - np.asarray(s.domain.lower)) @ np.abs(s.acceleration)
+        size = np.abs(np.asarray(s.domain.upper) - np.asarray(s.domain.lower))
+        reach = size @ np.abs(s.acceleration) + size @ np.abs(s.gradient) @ size
         return 0.5 * s.reference_speed**2 + float(reach)
 
     def read(self) -> Vital:
@@ -83,7 +84,7 @@ class Health:
         wp.launch(
             inspect,
             (pool.worlds, self.lanes),
-            [self.lanes, pool.capacity, pool.count, pool.position, pool.velocity, pool.mass, scene.gravity],
+            [self.lanes, pool.capacity, pool.count, pool.position, pool.velocity, pool.mass, scene.force],
             [self.top_speed, self.broken, self.energy],
             device=scene.device,
         )

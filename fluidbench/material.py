@@ -25,7 +25,9 @@ class Material(BaseModel):
     yield_stress: NonNegative | None = Field(None, description="von Mises yield stress in pure shear [Pa]")
     plastic_viscosity: NonNegative = Field(0.0, description="Herschel-Bulkley consistency [Pa s^n]")
     flow_index: Positive = Field(1.0, description="Herschel-Bulkley exponent n [-]")
-    relaxation_time: Positive | None = Field(None, description="Maxwell relaxation time [s]; instead of a yield stress")
+    relaxation_time: Positive | None = Field(
+        None, description="of an Oldroyd-B liquid, instead of a yield stress [s]"
+    )
     sound_speed: Positive | None = Field(None, description="sqrt(K/rho) [m/s]; overrides K from E and nu")
     bulk_modulus: Positive | None = Field(None, description="bulk modulus K [Pa]; overrides K from E and nu")
     equation_of_state: Literal["linear", "tait"] = Field("linear", description="pressure law; Tait has gamma = 7")
@@ -37,9 +39,7 @@ class Material(BaseModel):
         if self.youngs_modulus is None and (self.yield_stress is not None or self.relaxation_time is not None):
             raise ValueError("yield_stress and relaxation_time need youngs_modulus (100 x yield_stress is usual)")
         if self.relaxation_time is not None and (self.yield_stress is not None or self.plastic_viscosity > 0):
-            raise ValueError(
-                "relaxation_time stands for a Maxwell liquid: leave out yield_stress and plastic_viscosity"
-            )
+            raise ValueError("relaxation_time makes an Oldroyd-B liquid: leave out yield_stress and plastic_viscosity")
         if self.plastic_viscosity > 0 and self.yield_stress is None:
             raise ValueError("plastic_viscosity needs yield_stress (0 for a Maxwell liquid, or use viscosity)")
         return self
@@ -65,12 +65,7 @@ class Material(BaseModel):
 
     @property
     def flow_threshold(self) -> float:
-        """Shear stress at which it flows [Pa]: infinite for an elastic solid, 0 for a liquid."""
-        if self.youngs_modulus is None or self.relaxation_time is not None:
+        """Shear stress at which it flows plastically [Pa]: infinite for elastic matter, 0 for a liquid."""
+        if self.youngs_modulus is None:
             return 0.0
         return math.inf if self.yield_stress is None else self.yield_stress
-
-    @property
-    def flow_consistency(self) -> float:
-        """Consistency of the flow rule [Pa s^n]: `plastic_viscosity`, or G lambda for a Maxwell liquid."""
-        return self.plastic_viscosity if self.relaxation_time is None else self.shear_modulus * self.relaxation_time

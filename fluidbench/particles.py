@@ -11,13 +11,15 @@ from .scene import Scene
 wp.set_module_options({"enable_backward": False})
 MAX_SLOTS = 2**26  # neighbour lists keep 26 bits for an index
 
+FREE, IN_NOZZLE, CLAMPED = 0, 1, 2
+
 CORE = {
     "position": wp.vec3,  # [m]
     "velocity": wp.vec3,  # [m/s]
     "mass": float,  # [kg]
     "volume": float,  # rest volume, mass over rest density [m^3]
     "phase": int,  # row of the scene's phase table
-    "held": int,  # 1 while its velocity is prescribed (inside a nozzle, clamped)
+    "held": int,  # FREE, or why its velocity is prescribed: IN_NOZZLE, CLAMPED
     "birth_time": float,  # when it left the nozzle, 0 for a body [s]
     "origin": int,  # number in the order of creation: the particle's identity
 }
@@ -82,7 +84,7 @@ class Pool:
         self.count.assign(np.array(self.counts, np.int32))
         self.stale = True
 
-    def place(self, position: np.ndarray, velocity: np.ndarray, volume: float) -> None:
+    def place(self, position: np.ndarray, velocity: np.ndarray, volume: float, held: int = FREE) -> None:
         """Add the same particles of equal rest volume to every world (positions (n, 3) [m], velocities [m/s])."""
         n = len(position)
         for world, scenario in enumerate(self.scene.scenarios):
@@ -93,6 +95,7 @@ class Pool:
                 "velocity": np.asarray(velocity, np.float32),
                 "volume": np.full(n, volume, np.float32),
                 "mass": np.full(n, volume * scenario.material.density, np.float32),
+                "held": np.full(n, held, np.int32),
                 "origin": np.arange(self.counts[world], self.counts[world] + n, dtype=np.int32),
             }
             for name, values in columns.items():
@@ -108,10 +111,12 @@ class Pool:
             wp.copy(array, scratch)
         self.stale = True
 
-    def snapshot(self, world: int = 0) -> dict[str, np.ndarray]:
-        """The core fields of a world's active particles as NumPy arrays, in order of creation."""
+    def snapshot(self, world: int = 0, **more: np.ndarray) -> dict[str, np.ndarray]:
+        """The core fields of a world's active particles as NumPy arrays, in order of creation; and `more` columns,
+        given for all slots."""
         part = slice(world * self.capacity, world * self.capacity + self.counts[world])
         columns = {name: self.fields[name].numpy()[part].copy() for name in CORE}
+        columns |= {name: values[part].copy() for name, values in more.items()}
         order = np.argsort(columns["origin"], kind="stable")
         return {name: values[order] for name, values in columns.items()}
 

@@ -109,7 +109,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     rows: list[dict[str, float]] = []
 
     def observe(sim: Simulation, vital: Any) -> None:
-        frame = sim.pool.snapshot()
+        frame = sim.frame()
         rows.append(
             {"time_s": sim.now, "top_speed_m_s": vital.speed, **ledger(frame, scenario), **lengths(frame, scenario)}
         )
@@ -118,7 +118,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         report({"time": sim.now, "until": scenario.duration, "speed": vital.speed})
 
     outcome = simulation.run(observe, job.wall_limit)
-    frame = simulation.pool.snapshot()
+    frame = simulation.frame()
     series = pd.DataFrame(rows)
     series.to_parquet(folder / "series.parquet")
     save(folder / "final.npz", frame, simulation.now)

@@ -16,6 +16,7 @@ from .toolpath import Toolpath, Track
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
+CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
 FACES = ("x_lower", "x_upper", "y_lower", "y_upper", "z_lower", "z_upper")
 
 
@@ -107,8 +108,20 @@ class Nozzle(Model):
         return self.area * self.speed
 
 
+class Wave(Model):
+    """A velocity field amplitude sin(number . (x - center) + phase)."""
+
+    amplitude: Vector = Field(description="amplitude [m/s]")
+    number: Vector = Field(description="wave vector, 2 pi over the wave length [rad/m]")
+    phase: float = Field(0.0, description="phase at the body's centre [rad]")
+
+    def at(self, arm: np.ndarray) -> np.ndarray:
+        return np.sin(arm @ np.asarray(self.number) + self.phase)[:, None] * np.asarray(self.amplitude)
+
+
 class Body(Model):
-    """Material that is there at the start. Its velocity is velocity + gradient (x - center) + angular x (x - center).
+    """Material that is there at the start. Its velocity is the sum of `velocity`, of the gradient and the rotation
+    about the centre, and of `wave`.
 
     What lies outside the domain is cut off: a quarter of a cylinder stands at a corner of two slip walls.
     """
@@ -121,6 +134,8 @@ class Body(Model):
     velocity: Vector = Field((0.0, 0.0, 0.0), description="velocity of the centre [m/s]")
     velocity_gradient: Matrix | None = Field(None, description="dv_i/dx_j about the centre [1/s]")
     angular_velocity: Vector = Field((0.0, 0.0, 0.0), description="rotation about the centre [rad/s]")
+    wave: Wave | None = Field(None, description="a sine wave of velocity: amplitude, number, phase")
+    clamped: bool = Field(False, description="keeps its velocity whatever happens: a clamp or a moving grip")
 
     @model_validator(mode="after")
     def _complete(self) -> "Body":
@@ -150,7 +165,17 @@ class Body(Model):
         """Initial velocity at points of shape (n, 3) [m/s]."""
         arm = points - np.asarray(self.center)
         velocity = np.asarray(self.velocity) + np.cross(self.angular_velocity, arm)
-        return velocity if self.velocity_gradient is None else velocity + arm @ np.asarray(self.velocity_gradient).T
+        if self.velocity_gradient is not None:
+            velocity = velocity + arm @ np.asarray(self.velocity_gradient).T
+        return velocity if self.wave is None else velocity + self.wave.at(arm)
+
+    @property
+    def top_speed(self) -> float:
+        """The fastest initial speed, at the corners of the bounding box [m/s]."""
+        corners = np.asarray(self.center) + CORNERS * self.extent
+        still = self.model_copy(update={"wave": None}).velocity_at(corners)
+        crest = 0.0 if self.wave is None else float(np.linalg.norm(self.wave.amplitude))
+        return float(np.linalg.norm(still, axis=1).max()) + crest
 
 
 class Scenario(Model):
@@ -162,6 +187,8 @@ class Scenario(Model):
     material: Material
     gravity: Vector = Field((0.0, 0.0, -9.81), description="gravitational acceleration [m/s^2]")
     body_force: Vector = Field((0.0, 0.0, 0.0), description="further force per unit mass [m/s^2]")
+    body_force_gradient: Matrix | None = Field(None, description="its change over space, symmetric [1/s^2]")
+    body_force_center: Vector = Field((0.0, 0.0, 0.0), description="where the gradient adds nothing [m]")
     nozzle: Nozzle | None = None
     toolpath: Toolpath | None = None
     bodies: tuple[Body, ...] = ()
@@ -179,7 +206,9 @@ class Scenario(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
-        for check in (self._check_source, self._check_nozzle, self._check_bodies, self._check_periodic):
+        for check in (
+            self._check_source, self._check_nozzle, self._check_bodies, self._check_periodic, self._check_force,
+        ):  # fmt: skip
             check()
         return self
 
@@ -225,6 +254,10 @@ class Scenario(Model):
                     f"a periodic axis needs at least 6 spacings; {'xyz'[axis]} has {length / self.spacing:.3g}"
                 )
 
+    def _check_force(self) -> None:
+        if self.body_force_gradient is not None and not np.allclose(self.gradient, self.gradient.T):
+            raise ValueError("body_force_gradient must be symmetric: only then has the force a potential")
+
     @cached_property
     def track(self) -> Track | None:
         """The toolpath in time."""
@@ -234,8 +267,27 @@ class Scenario(Model):
 
     @property
     def acceleration(self) -> np.ndarray:
-        """Gravity plus body force, shape (3,) [m/s^2]."""
+        """Gravity plus body force where its gradient adds nothing, shape (3,) [m/s^2]."""
         return np.asarray(self.gravity) + np.asarray(self.body_force)
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """Gradient of the body force, shape (3, 3) [1/s^2]."""
+        return np.zeros((3, 3)) if self.body_force_gradient is None else np.asarray(self.body_force_gradient)
+
+    def potential_at(self, points: np.ndarray) -> np.ndarray:
+        """Minus the potential energy per unit mass at points of shape (n, 3) [J/kg]."""
+        arm = points - np.asarray(self.body_force_center)
+        return points @ self.acceleration + 0.5 * ((arm @ self.gradient) * arm).sum(axis=1)
+
+    @cached_property
+    def peak_acceleration(self) -> float:
+        """The largest acceleration where material starts [m/s^2]."""
+        points = [np.asarray(self.body_force_center)[None, :]]
+        points += [np.asarray(body.center) + CORNERS * body.extent for body in self.bodies]
+        points += [] if self.track is None else [self.track.position]
+        arm = np.concatenate(points) - np.asarray(self.body_force_center)
+        return float(np.linalg.norm(self.acceleration + arm @ self.gradient.T, axis=1).max())
 
     @cached_property
     def reference_speed(self) -> float:
@@ -246,11 +298,8 @@ class Scenario(Model):
             speeds.append(math.hypot(self.nozzle.speed, self.toolpath.speed))
             height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
         for body in self.bodies:
-            corners = (
-                np.asarray(body.center)
-                + np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * body.extent
-            )
-            speeds.append(float(np.linalg.norm(body.velocity_at(corners), axis=1).max()))
+            speeds.append(body.top_speed)
+            speeds.append(math.sqrt(np.abs(self.gradient).max()) * float(np.linalg.norm(body.extent)))
             height = max(height, float(body.center[2] + body.extent[2]) - self.domain.lower[2])
         return max(*speeds, math.sqrt(g * height))
 

@@ -28,6 +28,7 @@ class Phase:
     yield_stress: float
     plastic_viscosity: float
     flow_index: float
+    relaxation_rate: float
     tait: float
     tension_limit: float
 
@@ -44,8 +45,28 @@ class Box:
     upper_friction: wp.vec3
 
 
+@wp.struct
+class Force:
+    """Force per unit mass at x: uniform + gradient x."""
+
+    uniform: wp.vec3
+    gradient: wp.mat33
+
+
+@wp.func
+def force_at(force: Force, x: wp.vec3):
+    """Force per unit mass [m/s^2] at a point."""
+    return force.uniform + force.gradient * x
+
+
+@wp.func
+def force_potential(force: Force, x: wp.vec3):
+    """Minus the potential energy per unit mass [J/kg] at a point."""
+    return wp.dot(force.uniform + 0.5 * (force.gradient * x), x)
+
+
 class Scene:
-    """What a solver sees of the scenarios. `dt`, `gravity` and `phases` are device arrays, so that a captured graph
+    """What a solver sees of the scenarios. `dt`, `force` and `phases` are device arrays, so that a captured graph
     survives a change of their values."""
 
     def __init__(self, scenarios: Scenario | Sequence[Scenario], device: str = "cpu") -> None:
@@ -62,12 +83,12 @@ class Scene:
         self._dt = math.nan
         with wp.ScopedDevice(self.device):
             self.dt = wp.zeros(self.worlds, dtype=float)
-            self.gravity = wp.array(np.array([s.acceleration for s in self.scenarios], np.float32), dtype=wp.vec3)
+            self.force = wp.array([_force(s) for s in self.scenarios], dtype=Force)
             phases = wp.array([self._phase(s.material) for s in self.scenarios], dtype=Phase)
             self.phases = phases.reshape((self.worlds, 1))
 
     def _check_worlds(self) -> None:
-        vary = {"material", "gravity", "body_force", "name", "title", "seed"}
+        vary = {"material", "gravity", "body_force", "body_force_gradient", "name", "title", "seed"}
         first = self.scenario.model_dump(exclude=vary)
         for i, other in enumerate(self.scenarios[1:], 1):
             changed = [key for key, value in other.model_dump(exclude=vary).items() if value != first[key]]
@@ -84,7 +105,8 @@ class Scene:
         phase.shear_modulus = material.shear_modulus
         phase.viscosity = material.viscosity
         phase.yield_stress = min(material.flow_threshold, NEVER_YIELDS)
-        phase.plastic_viscosity = material.flow_consistency
+        phase.plastic_viscosity = material.plastic_viscosity
+        phase.relaxation_rate = 0.0 if material.relaxation_time is None else 1.0 / material.relaxation_time
         phase.flow_index = material.flow_index
         phase.tait = 1.0 if material.equation_of_state == "tait" else 0.0
         # A liquid cavitates rather than carry tension; what has shear stiffness holds together.
@@ -112,6 +134,15 @@ class Scene:
         if dt != self._dt:
             self.dt.fill_(dt)
             self._dt = dt
+
+
+def _force(scenario: Scenario) -> Force:
+    """The scenario's force field as a device structure."""
+    force = Force()
+    offset = scenario.gradient @ np.asarray(scenario.body_force_center)
+    force.uniform = wp.vec3(*(scenario.acceleration - offset))
+    force.gradient = wp.mat33(*scenario.gradient.ravel())
+    return force
 
 
 def box_of(scenario: Scenario) -> Box:

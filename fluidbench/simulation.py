@@ -13,7 +13,7 @@ from . import health
 from .errors import UserError
 from .health import Health, Vital
 from .layout import capacity_of, sample
-from .particles import OutOfCapacity, Pool
+from .particles import CLAMPED, FREE, OutOfCapacity, Pool
 from .process import emission
 from .process.emission import Emission
 from .scenario import Scenario
@@ -73,7 +73,7 @@ class Simulation:
         self.pool = Pool(self.scene, capacity_of(self.scenario))
         for body in self.scenario.bodies:
             points, volume = sample(body, self.scenario)
-            self.pool.place(points, body.velocity_at(points), volume)
+            self.pool.place(points, body.velocity_at(points), volume, CLAMPED if body.clamped else FREE)
         self.emission = Emission(self.scene, self.pool) if self.scenario.nozzle is not None else None
         self.solver = solver_class(self.scene, self.pool, self.config, backend)
         self.health = Health(self.scene, self.pool)
@@ -121,6 +121,12 @@ class Simulation:
         vital = self.health.read()
         self.speed = max(vital.speed, 0.1 * self.scenario.reference_speed)
         return vital
+
+    def frame(self, world: int = 0) -> dict[str, np.ndarray]:
+        """A world's particles as they are now: the pool's core fields, `density` [kg/m^3] and `spin` [kg m^2/s]."""
+        spins = self.solver.spins()
+        spins = np.zeros((self.pool.size, 3), np.float32) if spins is None else spins
+        return self.pool.snapshot(world, density=self.solver.densities(), spin=spins)
 
     def reorder(self, keys: wp.array) -> None:
         """Sort the pool by a solver's keys."""

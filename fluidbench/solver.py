@@ -94,6 +94,11 @@ class Solver(ABC):
     def densities(self) -> Any:
         """Present density of every particle slot, shape (worlds * capacity,) [kg/m^3], as a NumPy array."""
 
+    def spins(self) -> Any | None:
+        """Angular momentum of every particle slot about its own centre, shape (worlds * capacity, 3) [kg m^2/s]; None
+        where particles have none."""
+        return None
+
     @abstractmethod
     def footprint(self) -> dict[str, int]:
         """Bytes allocated by the method itself, by part."""

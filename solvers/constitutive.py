@@ -7,12 +7,13 @@ State of a material point: the volume ratio J = rho0 / rho and the isochoric ela
 
 with the pressure from an equation of state, the elastic deviator limited by Herschel-Bulkley flow and an explicit
 Newtonian viscosity eta. Flow follows Simo (1988) and Yue et al. (2015, ACM TOG 34:160): the yield criterion is von
-Mises, sqrt(J2) = yield stress in pure shear, so a bar in uniaxial compression yields at sqrt(3) times that.
+Mises, sqrt(J2) = yield stress in pure shear, so a bar in uniaxial compression yields at sqrt(3) times that. With a
+relaxation time instead of a yield stress b is the conformation tensor of an Oldroyd-B liquid (det b is then free).
 
 Every function is a plain law of floats (see bind.py): no solver, no array.
 """
 
-from math import pow, sqrt
+from math import exp, pow, sqrt
 
 
 def pressure(compression: float, bulk_modulus: float, tait: float, tension_limit: float):
@@ -56,12 +57,14 @@ def strain_and_flow(
     l_yx: float, l_yy: float, l_yz: float,
     l_zx: float, l_zy: float, l_zz: float,
     b_xx: float, b_yy: float, b_zz: float, b_xy: float, b_xz: float, b_yz: float,
-    shear_modulus: float, threshold: float, consistency: float, index: float, dt: float,
+    shear_modulus: float, threshold: float, consistency: float, index: float, relaxation: float, dt: float,
 ):  # fmt: skip
     """b after a step dt [s] under the velocity gradient l_ij = dv_i/dx_j [1/s]: (xx, yy, zz, xy, xz, yz).
 
-    Trial: b <- A b A^T, A = 1 + dt dev(l); then sqrt(J2) = G |dev b| / sqrt(2) returns to `flow_stress`, and b is
-    scaled back to det b = 1 (one Newton step for the cube root).
+    Trial: b <- A b A^T, A = 1 + dt dev(l). With relaxation = 0, sqrt(J2) = G |dev b| / sqrt(2) returns to
+    `flow_stress`, and b is scaled back to det b = 1 (one Newton step for the cube root). Otherwise b is the
+    conformation tensor of an Oldroyd-B liquid of relaxation rate `relaxation` [1/s]: b - 1 decays as
+    exp(-relaxation dt).
     """
     t = (l_xx + l_yy + l_zz) / 3.0
     a_xx = 1.0 + dt * (l_xx - t)
@@ -108,4 +111,8 @@ def strain_and_flow(
     c_yz = keep * c_yz
     det = c_xx * (c_yy * c_zz - c_yz * c_yz) - c_xy * (c_xy * c_zz - c_yz * c_xz) + c_xz * (c_xy * c_yz - c_yy * c_xz)
     unit = 3.0 / (2.0 + max(det, 0.0))
-    return c_xx * unit, c_yy * unit, c_zz * unit, c_xy * unit, c_xz * unit, c_yz * unit
+    rest = 0.0
+    if relaxation > 0.0:
+        unit = exp(-relaxation * dt)
+        rest = 1.0 - unit
+    return c_xx * unit + rest, c_yy * unit + rest, c_zz * unit + rest, c_xy * unit, c_xz * unit, c_yz * unit

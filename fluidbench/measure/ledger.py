@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..particles import IN_NOZZLE
 from ..scenario import Scenario
 from .bead import layer_heights, measure_bead
 from .deposit import Deposit
@@ -12,20 +13,22 @@ Frame = dict[str, np.ndarray]
 
 def deposit_of(frame: Frame, scenario: Scenario) -> Deposit:
     """The deposited field of a snapshot, without what is still inside the nozzle."""
-    free = frame["held"] == 0
+    free = frame["held"] != IN_NOZZLE
     return Deposit.of(frame["position"][free], frame["volume"][free], scenario.domain, scenario.spacing)
 
 
 def ledger(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """Mass, momentum, energies and centre of mass of everything outside the nozzle, summed in float64."""
-    free = frame["held"] == 0
+    free = frame["held"] != IN_NOZZLE
     m = frame["mass"][free].astype(float)
     x, v = frame["position"][free].astype(float), frame["velocity"][free].astype(float)
     mass = float(m.sum())
     row = {"particles": int(free.sum()), "mass_kg": mass}
     row |= {f"momentum_{axis}_kg_m_s": float(m @ v[:, i]) for i, axis in enumerate("xyz")}
+    turn = (m[:, None] * np.cross(x, v)).sum(axis=0) + frame["spin"][free].astype(float).sum(axis=0)
+    row |= {f"angular_momentum_{axis}_kg_m2_s": float(turn[i]) for i, axis in enumerate("xyz")}
     row["kinetic_energy_J"] = 0.5 * float(m @ (v * v).sum(axis=1))
-    row["potential_energy_J"] = -float((x @ scenario.acceleration) @ m)
+    row["potential_energy_J"] = -float(m @ scenario.potential_at(x))
     row |= {f"center_{axis}_m": float(m @ x[:, i]) / mass if mass else 0.0 for i, axis in enumerate("xyz")}
     return row
 
@@ -44,7 +47,7 @@ def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     bead = measure_bead(deposit_of(frame, scenario), scenario)
     if bead is not None and scenario.toolpath is not None:
         row |= bead.summary(scenario.toolpath.layers)
-        free = frame["held"] == 0
+        free = frame["held"] != IN_NOZZLE
         for i, rise in enumerate(layer_heights(frame["position"][free], frame["birth_time"][free], scenario), 2):
             row[f"layer_{i}_height_m"] = rise
         if scenario.toolpath.kind == "ring" and scenario.toolpath.center is not None:

@@ -42,7 +42,7 @@ def fidelity(results: Sequence[Finished]) -> Table:
     table = Table("Fidelity", ["", *groups])
     table.rows.append(["verdict", *[", ".join(sorted({r["verdict"] for r in g})) for g in groups.values()]])
     done = {name: [r for r in g if r["verdict"] == "completed"] for name, g in groups.items()}
-    hidden = ("momentum", "center", "potential", "particles")
+    hidden = ("momentum", "angular", "center", "potential", "particles")
     keys = dict.fromkeys(k for g in done.values() for r in g for k in r["measures"] if not k.startswith(hidden))
     for key in keys:
         values = [[r["measures"][key] for r in g if key in r["measures"]] for g in done.values()]

@@ -6,7 +6,7 @@ Quadratic B-splines; D = dx^2 / 4, so the inverse inertia tensor is 4 / dx^2.
 
 import warp as wp
 
-from fluidbench.scene import Phase
+from fluidbench.scene import Force, Phase, force_at
 
 from .. import constitutive
 from ..bind import warp_func
@@ -134,7 +134,8 @@ def p2g(
             b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
                 c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2],
                 b[0], b[1], b[2], s[0], s[1], s[2],
-                phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, h,
+                phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
+                phase.relaxation_rate, h,
             )  # fmt: skip
             b = wp.vec3(b_xx, b_yy, b_zz)
             s = wp.vec3(b_xy, b_xz, b_yz)
@@ -178,7 +179,7 @@ def p2g(
 @wp.kernel
 def grid_step(
     grid: Grid, lanes: int, active: wp.array(dtype=int), block_of: wp.array(dtype=int), table: wp.array(dtype=int),
-    raw: wp.array(dtype=wp.vec4), dt: wp.array(dtype=float), gravity: wp.array(dtype=wp.vec3),
+    raw: wp.array(dtype=wp.vec4), dt: wp.array(dtype=float), force: wp.array(dtype=Force),
     phases: wp.array2d(dtype=Phase),
     # outputs
     moving: wp.array(dtype=wp.vec4),
@@ -210,7 +211,9 @@ def grid_step(
             total = folded(grid, world, inside, touching, table, raw)
         result = wp.vec4(0.0, 0.0, 0.0, 0.0)
         if total[3] > 0.0:
-            v = wp.vec3(total[0], total[1], total[2]) / total[3] + dt[world] * gravity[world]
+            place = grid.origin + grid.dx * wp.vec3(float(inside[0]), float(inside[1]), float(inside[2]))
+            kick = dt[world] * force_at(force[world], place)
+            v = wp.vec3(total[0], total[1], total[2]) / total[3] + kick
             if wall:
                 v = wall_velocity(grid, inside, touching, v)
             density = total[3] * grid.inv_dx * grid.inv_dx * grid.inv_dx
@@ -223,7 +226,7 @@ def grid_step(
                         kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
                         result = flipped(result, axis, kind)
             if hold < 1.0:
-                result = hold * result + (1.0 - hold) * unbound(raw[t], dt[world] * gravity[world], result[3])
+                result = hold * result + (1.0 - hold) * unbound(raw[t], kick, result[3])
         moving[t] = result
         t += lanes
 

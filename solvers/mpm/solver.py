@@ -158,7 +158,7 @@ class SolverMPM(Solver):
             kernels.grid_step,
             self.node_lanes,
             [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.scene.dt,
-             self.scene.gravity, self.scene.phases],
+             self.scene.force, self.scene.phases],
             [self.moving],
             device=self.scene.device,
         )  # fmt: skip
@@ -201,6 +201,12 @@ class SolverMPM(Solver):
     def densities(self) -> np.ndarray:
         rest = np.array([s.material.density for s in self.scene.scenarios]).repeat(self.pool.capacity)
         return rest / self.pool.volume_ratio.numpy()
+
+    def spins(self) -> np.ndarray:
+        """m dx^2 / 4 times the rotation of the affine field (Jiang et al. 2015)."""
+        c = self.pool.affine.numpy()
+        turn = np.stack([c[:, 2, 1] - c[:, 1, 2], c[:, 0, 2] - c[:, 2, 0], c[:, 1, 0] - c[:, 0, 1]], axis=1)
+        return 0.25 * self.grid.dx**2 * self.pool.mass.numpy()[:, None] * turn
 
     def footprint(self) -> dict[str, int]:
         return {name: getattr(self, name).capacity for name in ("table", "block_of", "raw", "moving")}

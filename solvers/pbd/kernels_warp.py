@@ -7,7 +7,7 @@ Jacobi step a substep, `strain` and `pull`. Newtonian viscosity is mapped onto v
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, NEVER_YIELDS, PERIODIC, Box, Phase
+from fluidbench.scene import FRICTION, NEVER_YIELDS, PERIODIC, Box, Force, Phase, force_at
 
 from .. import constitutive
 from ..bind import warp_func
@@ -44,7 +44,7 @@ class Numbers:
 @wp.kernel
 def predict(
     num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    gravity: wp.array(dtype=wp.vec3), held: wp.array(dtype=int),
+    force: wp.array(dtype=Force), held: wp.array(dtype=int),
     # outputs
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), start: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
@@ -55,7 +55,7 @@ def predict(
         h = dt[world]
         v = velocity[i]
         if held[i] == 0:
-            v += h * gravity[world]
+            v += h * force_at(force[world], position[i])
         velocity[i] = v
         x = contained(box, position[i] + h * v, WALL_INSET * num.spacing)
         start[i] = x - h * v  # so that a periodic wrap or a wall does not count as motion twice
@@ -221,7 +221,7 @@ def strain(
         volume_strain += FOLLOW * whole * (-wp.log(wp.max(fill[i], 0.1)) - volume_strain)
         swelling[i] = volume_strain
         tension = float(0.0)
-        if phase.yield_stress >= NEVER_YIELDS:
+        if phase.yield_stress >= NEVER_YIELDS and phase.relaxation_rate == 0.0:
             tension = conveyed_modulus(num, phase.bulk_modulus, phase.density, dt[world]) * wp.max(volume_strain, 0.0)
         b = elastic_normal[i]
         s = elastic_shear[i]
@@ -229,7 +229,8 @@ def strain(
             b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
                 slope[0, 0], slope[0, 1], slope[0, 2], slope[1, 0], slope[1, 1], slope[1, 2], slope[2, 0], slope[2, 1],
                 slope[2, 2], b[0], b[1], b[2], s[0], s[1], s[2],
-                modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, dt[world],
+                modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
+                phase.relaxation_rate, dt[world],
             )  # fmt: skip
             b = wp.vec3(b_xx, b_yy, b_zz)
             s = wp.vec3(b_xy, b_xz, b_yz)
@@ -328,7 +329,7 @@ def shear(
 @wp.kernel
 def rub(
     box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
-    spacing: float, gravity: wp.array(dtype=wp.vec3), position: wp.array(dtype=wp.vec3),
+    spacing: float, force: wp.array(dtype=Force), position: wp.array(dtype=wp.vec3),
     # outputs
     velocity: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
@@ -348,7 +349,7 @@ def rub(
                 slide = v
                 slide[axis] = 0.0
                 speed = wp.length(slide)
-                grip = wp.min(friction * wp.abs(gravity[world][axis]) * dt[world], speed)
+                grip = wp.min(friction * wp.abs(force_at(force[world], position[i])[axis]) * dt[world], speed)
                 v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
                 v[axis] = normal
         velocity[i] = v

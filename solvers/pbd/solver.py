@@ -65,13 +65,13 @@ class SolverPBD(Solver):
                 f"shear modulus {m.shear_modulus:.3g} Pa acts like {1 / (1 / m.shear_modulus + 1 / stiffest):.3g} Pa: "
                 "one compliant constraint a substep conveys no more"
             )
-        if 0.0 <= m.flow_threshold < np.inf and m.youngs_modulus is not None:
+        if m.yield_stress is not None or m.relaxation_time is not None:
             words.append("no isotropic tension: density constraints only push")
         return [*words, "pressure is whatever keeps rho <= rho0: no equation of state, no sound speed"]
 
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        d, g = scenario.spacing, float(np.linalg.norm(scenario.acceleration))
+        d, g = scenario.spacing, scenario.peak_acceleration
         a = config.advance
         limits = [Bound("accuracy", a * d / max(speed, 1e-12), f"{a:g} d / v", "validation H: no stability bound")]
         if g > 0:
@@ -134,7 +134,7 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         self._launch(
             kernels.predict,
-            [self.num, scene.box, *self._active(), scene.dt, scene.gravity, pool.held],
+            [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held],
             [pool.position, pool.velocity, self.start],
         )
 
@@ -207,7 +207,7 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         self._launch(
             kernels.rub,
-            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.gravity, pool.position],
+            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.force, pool.position],
             [pool.velocity],
         )
 

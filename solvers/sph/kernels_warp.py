@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, Box, Phase
+from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, force_potential
 
 from .. import constitutive
 from ..bind import warp_func
@@ -46,7 +46,7 @@ WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below i
 
 @wp.kernel
 def level(
-    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), gravity: wp.array(dtype=wp.vec3),
+    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), force: wp.array(dtype=Force),
     position: wp.array(dtype=wp.vec3), phase_of: wp.array(dtype=int), density: wp.array(dtype=float),
     # outputs
     dynamic_density: wp.array(dtype=float),
@@ -57,7 +57,7 @@ def level(
     world = i / capacity
     if i - world * capacity < count[world]:
         phase = phases[world, phase_of[i]]
-        layering = (phase.density * phase.density / phase.bulk_modulus) * wp.dot(gravity[world], position[i])
+        layering = (phase.density * phase.density / phase.bulk_modulus) * force_potential(force[world], position[i])
         dynamic_density[i] = density[i] - phase.density - layering
 
 
@@ -135,7 +135,8 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                         gradient[0, 0], gradient[0, 1], gradient[0, 2], gradient[1, 0], gradient[1, 1],
                         gradient[1, 2], gradient[2, 0], gradient[2, 1], gradient[2, 2],
                         b[0], b[1], b[2], s[0], s[1], s[2],
-                        phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, h,
+                        phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
+                phase.relaxation_rate, h,
                     )  # fmt: skip
                     b = wp.vec3(b_xx, b_yy, b_zz)
                     s = wp.vec3(b_xy, b_xz, b_yz)
@@ -153,7 +154,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
 
     def force(
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-        phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), gravity: wp.array(dtype=wp.vec3),
+        phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
         position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
         density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
         # outputs
@@ -174,6 +175,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             tiny = 0.01 * num.h * num.h
             shock = num.artificial_viscosity * num.h * num.sound_speed / rho
             inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
+            pull = force_at(force[world], x)
             a = wp.vec3(0.0, 0.0, 0.0)
             wall = wp.vec3(0.0, 0.0, 0.0)
             start = i * lists.row
@@ -228,13 +230,13 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     friction = box.lower_friction[axis]
                     if inward < 0.0:
                         friction = box.upper_friction[axis]
-                    slide = v + dt[world] * (a + gravity[world])
+                    slide = v + dt[world] * (a + pull)
                     slide[axis] = 0.0
                     speed = wp.length(slide)
                     grip = wp.min(friction * normal, speed / dt[world])
                     a -= (grip / wp.max(speed, 1.0e-12)) * slide
                     a[axis] = a[axis] + inward * normal
-            acceleration[i] = a + gravity[world]
+            acceleration[i] = a + pull
 
     return SimpleNamespace(
         strain=_named(strain, name),

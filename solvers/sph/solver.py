@@ -65,7 +65,7 @@ class SolverSPH(Solver):
         h = config.smoothing(solid) * scenario.spacing
         # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1).
         nu = m.viscosity / m.density + config.alpha(solid) * h * c / 10.0
-        g = float(np.linalg.norm(scenario.acceleration))
+        g = scenario.peak_acceleration
         a = config
         return [
             Bound("acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; validation H: < 1.73"),
@@ -133,7 +133,7 @@ class SolverSPH(Solver):
         wp.launch(
             kernels.level,
             pool.size,
-            [pool.capacity, pool.count, scene.phases, scene.gravity, pool.position, pool.phase, pool.density],
+            [pool.capacity, pool.count, scene.phases, scene.force, pool.position, pool.phase, pool.density],
             [self.dynamic_density],
             device=scene.device,
         )
@@ -158,7 +158,7 @@ class SolverSPH(Solver):
         wp.launch(
             self.kernels.force,
             pool.size,
-            [*self._common(), self.scene.gravity, pool.position, pool.velocity, pool.mass, self.new_density, self.load,
+            [*self._common(), self.scene.force, pool.position, pool.velocity, pool.mass, self.new_density, self.load,
              self.stress],
             [self.acceleration],
             device=self.scene.device,

@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
+from fluidbench.scene import Force, force_at
 from fluidbench.solver import Config, Solver
 from fluidbench.timestep import Bound
 
@@ -16,7 +17,7 @@ def fly(
     capacity: int,
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
-    gravity: wp.array(dtype=wp.vec3),
+    force: wp.array(dtype=Force),
     held: wp.array(dtype=int),
     floor: float,
     position: wp.array(dtype=wp.vec3),
@@ -27,7 +28,7 @@ def fly(
     if i - world * capacity < count[world]:
         v = velocity[i]
         if held[i] == 0:
-            v += dt[world] * gravity[world]
+            v += dt[world] * force_at(force[world], position[i])
         x = position[i] + dt[world] * v
         if x[2] < floor:
             x = wp.vec3(x[0], x[1], floor)
@@ -55,7 +56,7 @@ class Ballistic(Solver):
     def substep(self) -> None:
         pool, scene = self.pool, self.scene
         floor = float(scene.scenario.domain.lower[2])
-        inputs: list[Any] = [pool.capacity, pool.count, scene.dt, scene.gravity, pool.held, floor]
+        inputs: list[Any] = [pool.capacity, pool.count, scene.dt, scene.force, pool.held, floor]
         wp.launch(fly, pool.size, [*inputs, pool.position, pool.velocity], device=scene.device)
 
     def densities(self) -> np.ndarray:
