@@ -9,9 +9,8 @@ import typer
 from .errors import UserError
 
 if TYPE_CHECKING:
-    from .report.tables import Table
     from .scenario import Scenario
-    from .study.compare import Finished
+    from .study.execute import Finished
 
 app = typer.Typer(
     name="fluidbench", no_args_is_help=True, add_completion=False, rich_markup_mode=None,
@@ -61,18 +60,82 @@ def run(
     _study(scenario, solver, set_, spacing, 1, device, out, wall_limit, frames)
 
 
+@app.command()
+def validate(
+    cases: Annotated[list[str] | None, typer.Argument(help="cases (see `fluidbench list`); default all")] = None,
+    solvers: Annotated[str, typer.Option(help="methods, separated by commas; default all that are installed")] = "",
+    levels: Annotated[str, typer.Option(help="spacings: rough, coarse, medium, fine (1.5, 1, 2/3, 1/2)")] = "coarse",
+    quick: Annotated[bool, typer.Option("--quick", help="a few minutes: the cheap cases, every physics")] = False,
+    device: Device = "cpu",
+    out: Out = None,
+    wall_limit: WallLimit = 1800.0,
+    jobs: Annotated[int | None, typer.Option(min=1, help="runs at a time; default 2, or 1 on CUDA")] = None,
+) -> None:
+    """Run cases with known answers through every method: error, observed order and cost beside the tolerance.
+
+    A second call reuses the runs that are finished.
+    """
+    from rich.console import Console
+
+    from .report.validation import present
+    from .solver import solver_names
+    from .store import Store
+    from .study.case import select
+    from .study.validate import plan
+
+    methods = _split(solvers) or solver_names()
+    _check_device(device)
+    trials = plan(select(cases or []), methods, _split(levels), quick, device, wall_limit)
+    store = Store((out or Path("fluidbench-out") / "validate").resolve())
+    _validate(trials, store, jobs or (2 if device == "cpu" else 1), Console(stderr=True))
+    if not present(trials, store.root, Console()):
+        raise typer.Exit(1)
+
+
+def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None:
+    """Run the trials: at a terminal under a live display, otherwise with a line for each that has ended."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from .report.validation import line
+    from .study.validate import run
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        overall = progress.add_task("cases", total=len(trials))
+        tasks: dict[int, Any] = {}
+
+        def started(i: int, trial: Any, reused: bool) -> None:
+            if not reused:
+                tasks[i] = progress.add_task(f"{trial.case.name} {trial.method} {trial.spacing:.3g} m", total=100)
+
+        def step(i: int, state: dict[str, Any]) -> None:
+            progress.update(tasks[i], completed=int(100 * state["time"] / state["until"]))
+            if state["time"] >= state["until"]:
+                progress.remove_task(tasks.pop(i))
+
+        def ended(trial: Any) -> None:
+            progress.advance(overall)
+            console.print(line(trial), markup=False, highlight=False, soft_wrap=True)
+
+        run(trials, store, workers, started, step, ended)
+
+
 @app.command("list")
 def list_() -> None:
-    """Shipped scenarios and installed methods, one line each."""
+    """Shipped scenarios, cases with known answers and installed methods, one line each."""
     from .library import load, shipped
     from .solver import get_solver, solver_names
+    from .study.case import cases
 
     typer.echo("scenarios")
     for name in shipped():
-        typer.echo(f"  {name:<14} {load(name).title}")
+        typer.echo(f"  {name:<20} {load(name).title}")
+    typer.echo("cases with known answers, for validate")
+    for name, case in cases().items():
+        typer.echo(f"  {name:<20} {case.title} ({case.physics})")
     typer.echo("solvers")
     for name in solver_names():
-        typer.echo(f"  {name:<14} {(get_solver(name).__doc__ or '').strip().splitlines()[0]}")
+        typer.echo(f"  {name:<20} {(get_solver(name).__doc__ or '').strip().splitlines()[0]}")
 
 
 @app.command()
@@ -81,13 +144,14 @@ def show(scenario: ScenarioName, set_: Settings = None, spacing: Spacing = None)
     from rich.console import Console
 
     from .report.preview import preview
+    from .report.tables import show as print_table
 
     resolved = _load(scenario, set_, spacing)
     console = Console()
     text, tables = preview(resolved)
     console.print(text, markup=False, highlight=False)
     for table in tables:
-        _print_table(console, table)
+        print_table(console, table)
 
 
 @app.command()
@@ -104,6 +168,10 @@ def _load(name: str, settings: list[str] | None, spacing: float | None) -> "Scen
 
     extra = [f"spacing={spacing!r}"] if spacing is not None else []
     return load(name, [*(settings or []), *extra])
+
+
+def _split(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]
 
 
 def _check_device(device: str) -> None:
@@ -131,7 +199,7 @@ def _study(
     from .study.compare import jobs
 
     scenario = _load(name, settings, spacing)
-    methods = [part.strip() for part in solvers.split(",") if part.strip()] or solver_names()
+    methods = _split(solvers) or solver_names()
     planned = jobs(scenario, methods, repeats, device, "warp", wall_limit, frames)
     _check_device(device)
     console, errors = Console(), Console(stderr=True)
@@ -148,7 +216,7 @@ def _run_all(planned: list[Any], store: Any, console: Any) -> list["Finished"]:
     """Run the jobs under a live display; quiet when not at a terminal."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from .study.compare import compare as run_jobs
+    from .study.execute import Hooks, execute
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
@@ -165,7 +233,7 @@ def _run_all(planned: list[Any], store: Any, console: Any) -> list["Finished"]:
         def ended(i: int, result: "Finished") -> None:
             progress.update(tasks[i], completed=1.0, state=result.record["verdict"])
 
-        return run_jobs(planned, store, started, step, ended)
+        return execute(planned, store, Hooks(started, step, ended))
 
 
 def _present(results: list["Finished"], root: Path, console: Any) -> None:
@@ -173,8 +241,10 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
     from .report.figures import draw, draw_views
     from .report.html import write_page
     from .report.tables import against_reference, costs, fidelity
+    from .report.tables import show as print_table
     from .report.traces import plots
-    from .study.compare import ADVICE, tidy, write_tables
+    from .study.compare import tidy, write_tables
+    from .study.execute import ADVICE
 
     write_tables(tidy(results), root)
     tables = [t for t in (fidelity(results), against_reference(results), costs(results)) if t is not None]
@@ -184,7 +254,7 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
         draw(plot, root)
     page = write_page(results, tables, drawn, views, root)
     for table in tables:
-        _print_table(console, table)
+        print_table(console, table)
     for result in results:
         if not result.ok:
             verdict = result.record["verdict"]
@@ -192,20 +262,6 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
                 f"{result.label}: {verdict}: {result.record['reason']}; {ADVICE.get(verdict, '')}", markup=False
             )
     console.print(f"report: {page}", markup=False, highlight=False, soft_wrap=True)
-
-
-def _print_table(console: Any, table: "Table") -> None:
-    from rich.markup import escape
-    from rich.table import Table as RichTable
-
-    shown = RichTable(title=table.title, title_justify="left", title_style="bold")
-    for i, head in enumerate(table.head):
-        shown.add_column(escape(head), justify="left" if i == 0 else "right", overflow="fold")
-    for row in table.rows:
-        shown.add_row(*map(escape, row))
-    console.print(shown)
-    if table.note:
-        console.print(table.note, markup=False, highlight=False)
 
 
 def main() -> None:

@@ -25,9 +25,7 @@ class Material(BaseModel):
     yield_stress: NonNegative | None = Field(None, description="von Mises yield stress in pure shear [Pa]")
     plastic_viscosity: NonNegative = Field(0.0, description="Herschel-Bulkley consistency [Pa s^n]")
     flow_index: Positive = Field(1.0, description="Herschel-Bulkley exponent n [-]")
-    relaxation_time: Positive | None = Field(
-        None, description="of an Oldroyd-B liquid, instead of a yield stress [s]"
-    )
+    relaxation_time: Positive | None = Field(None, description="of an Oldroyd-B liquid, instead of a yield stress [s]")
     sound_speed: Positive | None = Field(None, description="sqrt(K/rho) [m/s]; overrides K from E and nu")
     bulk_modulus: Positive | None = Field(None, description="bulk modulus K [Pa]; overrides K from E and nu")
     equation_of_state: Literal["linear", "tait"] = Field("linear", description="pressure law; Tait has gamma = 7")

@@ -11,7 +11,7 @@ from .scene import Scene
 wp.set_module_options({"enable_backward": False})
 MAX_SLOTS = 2**26  # neighbour lists keep 26 bits for an index
 
-FREE, IN_NOZZLE, CLAMPED = 0, 1, 2
+FREE, CARRIED, CLAMPED = wp.constant(0), wp.constant(1), wp.constant(2)
 
 CORE = {
     "position": wp.vec3,  # [m]
@@ -19,7 +19,7 @@ CORE = {
     "mass": float,  # [kg]
     "volume": float,  # rest volume, mass over rest density [m^3]
     "phase": int,  # row of the scene's phase table
-    "held": int,  # FREE, or why its velocity is prescribed: IN_NOZZLE, CLAMPED
+    "held": int,  # FREE; CARRIED along by the feed, without strain; CLAMPED: strains, but keeps its velocity
     "birth_time": float,  # when it left the nozzle, 0 for a body [s]
     "origin": int,  # number in the order of creation: the particle's identity
 }

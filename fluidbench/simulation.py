@@ -107,14 +107,18 @@ class Simulation:
             self.emission.advance(self.now, self.tick)
         if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
             self.reorder(keys)
-        if self.pool.stale:
-            self.solver.refresh()
-            self.pool.stale = False
+        self._refresh()
         steps = plan(self.bounds(), self.tick)
         self.scene.set_dt(steps.dt)
         self._run(steps.substeps)
         self.done += 1
         return steps
+
+    def _refresh(self) -> None:
+        """Tell the solver, once, of particles that appeared or were moved."""
+        if self.pool.stale:
+            self.solver.refresh()
+            self.pool.stale = False
 
     def look(self) -> Vital:
         """Read the vital signs; synchronises with the device."""
@@ -167,6 +171,7 @@ class Simulation:
         if observe is not None:
             if self.emission is not None:
                 self.emission.advance(0.0, self.tick)
+            self._refresh()
             observe(self, self.look())
         while self.done < self.ticks and outcome.verdict is Verdict.COMPLETED:
             self._tick(outcome, every, observe, wall_limit)

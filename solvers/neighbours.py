@@ -85,6 +85,16 @@ def image_velocity(box: Box, v: wp.vec3, code: int):
 
 
 @wp.func
+def image_gradient(box: Box, g: wp.vec3, code: int):
+    """The gradient of a scalar seen in the walls: mirrors turn its normal component round."""
+    out = g
+    for axis in range(3):
+        if face_kind(box, code, axis) != PERIODIC:
+            out[axis] = -out[axis]
+    return out
+
+
+@wp.func
 def contained(box: Box, x: wp.vec3, inset: float):
     """A position wrapped along periodic axes and kept `inset` in front of walls, so it never meets its own image."""
     out = x

@@ -11,7 +11,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 def cell_keys(
-    lower: wp.vec3, inv_cell: float, cells: wp.vec3i, capacity: int, count: wp.array(dtype=int),
+    lower: wp.vec3, inv_cell: wp.vec3, cells: wp.vec3i, capacity: int, count: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3), keys: wp.array(dtype=wp.int64),
 ):  # fmt: skip
     """World, then blocks of 4 x 4 x 4 cells, then cells; unused slots come last within their world."""
@@ -20,7 +20,7 @@ def cell_keys(
     per_world = wp.int64(cells[0]) * wp.int64(cells[1]) * wp.int64(cells[2]) * wp.int64(64)
     key = per_world
     if p - world * capacity < count[world]:
-        x = (position[p] - lower) * inv_cell
+        x = wp.cw_mul(position[p] - lower, inv_cell)
         i = wp.clamp(int(x[0]), 0, cells[0] * 4 - 1)
         j = wp.clamp(int(x[1]), 0, cells[1] * 4 - 1)
         k = wp.clamp(int(x[2]), 0, cells[2] * 4 - 1)
@@ -30,12 +30,14 @@ def cell_keys(
 
 
 class CellOrder:
-    """Sort keys of a pool for cells of a given edge [m], the first of which begins `shift` edges below the domain."""
+    """Sort keys of a pool for cells of given edges [m], the first of which begins `shift` edges below the domain."""
 
-    def __init__(self, scene: Scene, pool: Pool, cell: float, shift: float = 0.0) -> None:
-        self.scene, self.pool, self.cell = scene, pool, cell
-        self.lower = scene.box.lower - wp.vec3(shift * cell, shift * cell, shift * cell)
+    def __init__(self, scene: Scene, pool: Pool, cell: float | np.ndarray, shift: float = 0.0) -> None:
+        self.scene, self.pool = scene, pool
+        cell = np.broadcast_to(cell, 3)
         domain = scene.scenario.domain
+        self.lower = wp.vec3(*(np.asarray(domain.lower) - shift * cell))
+        self.inverse = wp.vec3(*(1.0 / cell))
         length = np.asarray(domain.upper) - np.asarray(domain.lower)
         self.blocks = wp.vec3i(*(np.ceil(length / (4 * cell)).astype(int) + 1).tolist())
         self.values = wp.zeros(2 * pool.size, dtype=wp.int64, device=scene.device)
@@ -45,7 +47,7 @@ class CellOrder:
         wp.launch(
             cell_keys,
             self.pool.size,
-            [self.lower, 1.0 / self.cell, self.blocks, self.pool.capacity, self.pool.count,
+            [self.lower, self.inverse, self.blocks, self.pool.capacity, self.pool.count,
              self.pool.position, self.values],
             device=self.scene.device,
         )  # fmt: skip

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..particles import IN_NOZZLE
+from ..particles import CARRIED
 from ..scenario import Scenario
 from .bead import layer_heights, measure_bead
 from .deposit import Deposit
@@ -13,13 +13,13 @@ Frame = dict[str, np.ndarray]
 
 def deposit_of(frame: Frame, scenario: Scenario) -> Deposit:
     """The deposited field of a snapshot, without what is still inside the nozzle."""
-    free = frame["held"] != IN_NOZZLE
+    free = frame["held"] != CARRIED
     return Deposit.of(frame["position"][free], frame["volume"][free], scenario.domain, scenario.spacing)
 
 
 def ledger(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """Mass, momentum, energies and centre of mass of everything outside the nozzle, summed in float64."""
-    free = frame["held"] != IN_NOZZLE
+    free = frame["held"] != CARRIED
     m = frame["mass"][free].astype(float)
     x, v = frame["position"][free].astype(float), frame["velocity"][free].astype(float)
     mass = float(m.sum())
@@ -47,7 +47,7 @@ def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     bead = measure_bead(deposit_of(frame, scenario), scenario)
     if bead is not None and scenario.toolpath is not None:
         row |= bead.summary(scenario.toolpath.layers)
-        free = frame["held"] != IN_NOZZLE
+        free = frame["held"] != CARRIED
         for i, rise in enumerate(layer_heights(frame["position"][free], frame["birth_time"][free], scenario), 2):
             row[f"layer_{i}_height_m"] = rise
         if scenario.toolpath.kind == "ring" and scenario.toolpath.center is not None:

@@ -29,12 +29,17 @@ def front(deposit: Deposit) -> float:
 
 def spread_radius(deposit: Deposit, x0: float, y0: float) -> float:
     """Radius about an axis at which the azimuthally averaged height falls below one spacing [m]."""
+    return _falls_below(*radial_heights(deposit, x0, y0), deposit.spacing)
+
+
+def radial_heights(deposit: Deposit, x0: float, y0: float) -> tuple[np.ndarray, np.ndarray]:
+    """(radius (n,), azimuthally averaged height (n,)) [m] about a vertical axis, one ring a cell."""
     x, y, heights = deposit.column_heights()
     radius = np.hypot(x[:, None] - x0, y[None, :] - y0)
     ring = np.rint(radius / deposit.spacing).astype(int)
     count = np.maximum(np.bincount(ring.ravel()), 1)
     mean = np.bincount(ring.ravel(), heights.ravel()) / count
-    return _falls_below(np.arange(len(mean)) * deposit.spacing, mean, deposit.spacing)
+    return np.arange(len(mean)) * deposit.spacing, mean
 
 
 def _falls_below(x: np.ndarray, values: np.ndarray, level: float) -> float:

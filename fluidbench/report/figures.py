@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..scenario import Scenario
-from ..study.compare import Finished
+from ..study.execute import Finished
 from .traces import Plot, load_frame
 
 
@@ -31,8 +31,11 @@ def draw(plot: Plot, folder: Path) -> Path:
         elif trace.style == "points":
             axes.plot(trace.x, trace.y, "o", mfc="none", color=trace.colour, label=trace.label)
         else:
-            axes.plot(trace.x, trace.y, color=trace.colour, label=trace.label or None, lw=1.6)
+            marker = "o" if trace.style == "line+points" else ""
+            axes.plot(trace.x, trace.y, marker=marker, color=trace.colour, label=trace.label or None, lw=1.6)
     axes.set(title=plot.title, xlabel=plot.x, ylabel=plot.y)
+    if plot.log:
+        axes.set(xscale="log", yscale="log")
     if plot.equal:
         axes.set_aspect("equal")
         axes.set_ylim(bottom=0)

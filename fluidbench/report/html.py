@@ -5,15 +5,19 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..scenario import Scenario
 from ..store import write_atomically
-from ..study.compare import ADVICE, Finished
+from ..study.execute import ADVICE, Finished
 from .tables import Table
 from .traces import Plot, run_files
 
-TEMPLATE = """<!doctype html>
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+BASE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{{ title }}</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <link rel="icon" href="data:,">
@@ -26,12 +30,18 @@ th:first-child, td:first-child { text-align: left; } thead th { border-bottom: 2
 .grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(28rem, 1fr)); gap: 1rem; }
 .bad { color: #a40000; } img { max-width: 100%; }
 code { background: #f3f3f3; padding: 0 .25rem; } li { margin: .2rem 0; }
-</style>{{ plotly_js }}</head><body>
+</style>{{ script }}</head><body>
 <h1>{{ title }}</h1>
-<p>{{ subtitle }}</p>
-{% for table in tables %}<h2>{{ table.title }}</h2>
-<table><thead><tr>{% for cell in table.head %}<th>{{ cell }}</th>{% endfor %}</tr></thead><tbody>
+{% block body %}{% endblock %}
+</body></html>
+"""
+ROWS = """{% macro rows(table) %}<table><thead><tr>
+{%- for cell in table.head %}<th>{{ cell }}</th>{% endfor %}</tr></thead><tbody>
 {% for row in table.rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
+{%- endmacro %}"""
+COMPARE = """{% extends "base" %}{% block body %}<p>{{ subtitle }}</p>
+{% for table in tables %}<h2>{{ table.title }}</h2>
+{{ rows(table) }}
 {% if table.note %}<p>{{ table.note }}</p>{% endif %}{% endfor %}
 {% if failures %}<h2>Runs that are not results</h2><ul>
 {% for line in failures %}<li class="bad">{{ line }}</li>{% endfor %}</ul>{% endif %}
@@ -41,12 +51,30 @@ code { background: #f3f3f3; padding: 0 .25rem; } li { margin: .2rem 0; }
 <img alt="side and top views of every method" src="data:image/png;base64,{{ views }}">{% endif %}
 <h2>Plots</h2><div class="grid">{% for plot in plots %}<div>{{ plot }}</div>{% endfor %}</div>
 <h2>Records</h2><ul>{% for label, path in files %}<li><a href="{{ path }}">{{ label }}</a></li>{% endfor %}</ul>
-<p>{{ machine }}</p>
-</body></html>
+<p>{{ machine }}</p>{% endblock %}
 """
 
 
-def _plotly(plot: Plot) -> str:
+def environment(pages: dict[str, str]) -> Environment:
+    """Templates that may extend "base" and use the macro `rows(table)`."""
+    from jinja2 import DictLoader
+    from jinja2 import Environment as Templates
+
+    made = Templates(autoescape=True, loader=DictLoader({"base": BASE, "rows": ROWS, **pages}))
+    made.globals["rows"] = made.get_template("rows").module.rows  # type: ignore[attr-defined]
+    return made
+
+
+def script() -> Markup:
+    """plotly.js, so that the page needs no network."""
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    return Markup(f"<script>{get_plotlyjs()}</script>")
+
+
+def plotly_html(plot: Plot) -> str:
+    """An interactive plot as a piece of HTML."""
     import plotly.graph_objects as go
 
     figure = go.Figure()
@@ -54,7 +82,7 @@ def _plotly(plot: Plot) -> str:
         if trace.style == "bar":
             figure.add_bar(x=trace.x, y=trace.y, name=trace.label, marker_color=trace.colour, showlegend=False)
         else:
-            mode = "markers" if trace.style == "points" else "lines"
+            mode = {"points": "markers", "line+points": "lines+markers"}.get(trace.style, "lines")
             figure.add_scatter(
                 x=trace.x, y=trace.y, mode=mode, name=trace.label, line_color=trace.colour, legendgroup=trace.colour,
                 showlegend=bool(trace.label),
@@ -63,6 +91,9 @@ def _plotly(plot: Plot) -> str:
         title=plot.title, xaxis_title=plot.x, yaxis_title=plot.y, template="plotly_white", height=360,
         margin={"l": 60, "r": 20, "t": 50, "b": 50},
     )  # fmt: skip
+    if plot.log:
+        figure.update_xaxes(type="log")
+        figure.update_yaxes(type="log")
     if plot.equal:
         figure.update_yaxes(scaleanchor="x", scaleratio=1)
     return figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False})
@@ -72,17 +103,15 @@ def write_page(
     results: Sequence[Finished], tables: Sequence[Table], drawn: Sequence[Plot], views: Path | None, root: Path
 ) -> Path:
     """Write report.html into the study's folder."""
-    from jinja2 import Environment
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
     first: dict[str, Any] = next((r.record for r in results if "input" in r.record), results[0].record)
     scenario = Scenario.model_validate(first["input"]) if "input" in first else None
     machine = first.get("machine", {})
-    page = Environment(autoescape=True).from_string(TEMPLATE).render(
+    page = environment({"page": COMPARE}).get_template("page").render(
         title=f"fluidbench compare: {first['scenario']}",
         subtitle=scenario.title if scenario is not None else "",
-        plotly_js=Markup(f"<script>{get_plotlyjs()}</script>"),
+        script=script(),
         tables=tables,
         failures=[
             f"{r.label}: {(v := r.record['verdict'])}: {r.record.get('reason', '')}; {ADVICE.get(v, '')}"
@@ -91,7 +120,7 @@ def write_page(
         notes=[f"{r.label}: {line}" for r in results if r.record["repeat"] == 0
                for line in r.record.get("approximations", [])],
         views=base64.b64encode(views.read_bytes()).decode() if views is not None else "",
-        plots=[Markup(_plotly(plot)) for plot in drawn],
+        plots=[Markup(plotly_html(plot)) for plot in drawn],
         files=run_files(results, root),
         machine="; ".join(f"{key} {value}" for key, value in machine.items()),
     )  # fmt: skip

@@ -1,11 +1,17 @@
 """Tables for people: the same rows in the terminal and on the page."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import mean, stdev
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..study.compare import Finished, binding
+from ..study.compare import binding
+from ..study.execute import Finished
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 @dataclass(frozen=True)
@@ -16,6 +22,21 @@ class Table:
     head: list[str]
     rows: list[list[str]] = field(default_factory=list)
     note: str = ""
+
+
+def show(console: Console, table: Table) -> None:
+    """Print a table to the terminal."""
+    from rich.markup import escape
+    from rich.table import Table as RichTable
+
+    shown = RichTable(title=table.title, title_justify="left", title_style="bold")
+    for i, head in enumerate(table.head):
+        shown.add_column(escape(head), justify="left" if i == 0 else "right", overflow="fold")
+    for row in table.rows:
+        shown.add_row(*map(escape, row))
+    console.print(shown)
+    if table.note:
+        console.print(table.note, markup=False, highlight=False)
 
 
 def number(value: float) -> str:

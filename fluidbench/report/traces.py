@@ -13,7 +13,7 @@ from ..measure.bead import measure_bead
 from ..measure.ledger import deposit_of
 from ..measure.reference import table
 from ..scenario import Scenario
-from ..study.compare import Finished
+from ..study.execute import Finished
 
 COLOURS = {"mpm": "#0072B2", "sph": "#D55E00", "pbd": "#009E73"}  # Okabe & Ito: distinct for colour-blind readers
 OTHERS = ("#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -37,7 +37,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Plot:
-    """One plot: traces, axis titles with units, and whether both axes share a scale."""
+    """One plot: traces, axis titles with units; `equal`: both axes share a scale, `log`: both are logarithmic."""
 
     name: str
     title: str
@@ -45,6 +45,7 @@ class Plot:
     y: str
     traces: list[Trace] = field(default_factory=list)
     equal: bool = False
+    log: bool = False
 
 
 def load_frame(result: Finished) -> dict[str, np.ndarray]:

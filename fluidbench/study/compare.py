@@ -2,42 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..run import Job, launch
+from ..run import Job
 from ..scenario import Scenario
 from ..solver import configure, get_solver
-from ..store import Store, write_atomically
+from ..store import write_atomically
+from .execute import Finished
 
 if TYPE_CHECKING:
     import pandas as pd
-
-ADVICE = {
-    "diverged": "its results are left out of every comparison",
-    "out_of_capacity": "see the reason for the setting to raise",
-    "timeout": "raise --wall-limit, or use a larger --spacing",
-    "error": "see log.txt in the run's folder",
-}
-
-
-@dataclass(frozen=True)
-class Finished:
-    """A run's record and the folder that holds its files; `reused` when an earlier call had finished it."""
-
-    record: dict[str, Any]
-    folder: Path
-    reused: bool
-
-    @property
-    def ok(self) -> bool:
-        return self.record["verdict"] == "completed"
-
-    @property
-    def label(self) -> str:
-        return str(self.record["method"])
 
 
 def jobs(
@@ -53,41 +29,6 @@ def jobs(
         for name in methods
         for repeat in range(repeats)
     ]
-
-
-def compare(
-    planned: Sequence[Job], store: Store, started: Callable[[int, Job, bool], None],
-    progress: Callable[[int, dict[str, Any]], None], ended: Callable[[int, Finished], None],
-) -> list[Finished]:  # fmt: skip
-    """Run what is not finished yet, one run at a time so that timings mean something."""
-    results = []
-    for i, job in enumerate(planned):
-        folder = store.folder(f"{job.scenario['name']}-{job.method}", job.inputs())
-        record = store.record(folder)
-        reused = record is not None
-        started(i, job, reused)
-        if record is None:
-            record = _refused(job, folder) or launch(job, folder, lambda state, i=i: progress(i, state))
-        results.append(Finished(record, folder, reused))
-        ended(i, results[-1])
-    return results
-
-
-def _refused(job: Job, folder: Path) -> dict[str, Any] | None:
-    """The record of a method that will not run the scenario."""
-    import json
-
-    scenario = Scenario.model_validate(job.scenario)
-    solver = get_solver(job.method)
-    reason = solver.refuses(scenario, configure(solver, scenario))
-    if reason is None:
-        return None
-    record = {
-        "scenario": scenario.name, "method": job.method, "device": job.device, "backend": job.backend,
-        "repeat": job.repeat, "verdict": "refused", "reason": reason,
-    }  # fmt: skip
-    write_atomically(folder / "record.json", json.dumps(record, indent=1))
-    return record
 
 
 def tidy(results: Sequence[Finished]) -> pd.DataFrame:

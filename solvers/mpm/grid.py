@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from fluidbench.errors import UserError
+from fluidbench.scenario import Domain
 from fluidbench.scene import Scene
 
 FIRST = 4  # node index of the lower walls: one block of ghost nodes lies behind them
@@ -19,8 +20,9 @@ MAX_BLOCKS = 2**30
 @wp.struct
 class Grid:
     origin: wp.vec3  # position of node 0 [m]
-    dx: float  # node spacing [m]
-    inv_dx: float  # [1/m]
+    dx: wp.vec3  # node spacing [m]
+    inv_dx: wp.vec3  # [1/m]
+    inv_volume: float  # of a cell [1/m^3]
     cells: wp.vec3i
     first: wp.vec3i  # node at the lower face
     wrap: wp.vec3i  # cells along periodic axes, else 0
@@ -30,28 +32,35 @@ class Grid:
     upper_kind: wp.vec3i
     lower_friction: wp.vec3
     upper_friction: wp.vec3
-    lower: wp.vec3  # walls as the grid has them [m]
+    lower: wp.vec3  # walls [m]
     upper: wp.vec3
 
 
-def grid_of(scene: Scene, dx: float) -> Grid:
-    """The grid of a scene; walls lie on node planes, so lengths are rounded to whole cells (periodic ones must fit)."""
-    domain, grid = scene.scenario.domain, Grid()
+def cells_of(domain: Domain, wanted: float) -> tuple[np.ndarray, np.ndarray]:
+    """(cells, edges of a cell [m]) along each axis: walls lie on nodes, so that an edge is what comes nearest to
+    `wanted` and divides the domain."""
     length = np.asarray(domain.upper) - np.asarray(domain.lower)
-    cells = np.maximum(1, np.rint(length / dx)).astype(int)
+    cells = np.maximum(1, np.rint(length / wanted)).astype(int)
+    return cells, length / cells
+
+
+def grid_of(scene: Scene, wanted: float) -> Grid:
+    """The grid of a scene with cells of about the edge wanted [m]."""
+    domain, grid = scene.scenario.domain, Grid()
+    cells, dx = cells_of(domain, wanted)
     lone = np.asarray(scene.periodic) & (cells % 4 == 1)
     first = np.where(lone, FIRST + 2, FIRST)
     blocks = (cells + 2 * FIRST + 2) // 4 + 1
     if int(np.prod(blocks)) * scene.worlds > MAX_BLOCKS:
         raise UserError(f"the domain holds {np.prod(blocks):.3g} grid blocks; use a smaller domain or a larger spacing")
     grid.origin, grid.first = wp.vec3(*(np.asarray(domain.lower) - first * dx)), wp.vec3i(*first.tolist())
-    grid.dx, grid.inv_dx = dx, 1.0 / dx
+    grid.dx, grid.inv_dx, grid.inv_volume = wp.vec3(*dx), wp.vec3(*(1.0 / dx)), float(1.0 / dx.prod())
     grid.cells, grid.blocks = wp.vec3i(*cells.tolist()), wp.vec3i(*blocks.tolist())
     grid.wrap = wp.vec3i(*[int(n) if periodic else 0 for n, periodic in zip(cells, scene.periodic, strict=True)])
     grid.blocks_per_world = int(np.prod(blocks))
     for name in ("lower_kind", "upper_kind", "lower_friction", "upper_friction"):
         setattr(grid, name, getattr(scene.box, name))
-    grid.lower, grid.upper = wp.vec3(*domain.lower), wp.vec3(*(np.asarray(domain.lower) + cells * dx))
+    grid.lower, grid.upper = wp.vec3(*domain.lower), wp.vec3(*domain.upper)
     return grid
 
 
@@ -70,7 +79,7 @@ def wrapped(node: int, first: int, wrap: int):
 @wp.func
 def first_node(grid: Grid, x: wp.vec3):
     """The lowest of the 27 nodes around a point (before wrapping)."""
-    y = (x - grid.origin) * grid.inv_dx
+    y = wp.cw_mul(x - grid.origin, grid.inv_dx)
     return wp.vec3i(int(wp.floor(y[0] - 0.5)), int(wp.floor(y[1] - 0.5)), int(wp.floor(y[2] - 0.5)))
 
 

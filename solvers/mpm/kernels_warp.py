@@ -1,11 +1,12 @@
 """MLS-MPM (Hu et al. 2018, ACM TOG 37:150) with APIC transfers (Jiang et al. 2015, ACM TOG 34:51), in Warp.
 
 One substep: clear_grid, p2g (strain, stress, scatter), grid (momentum balance and walls), g2p (gather, move).
-Quadratic B-splines; D = dx^2 / 4, so the inverse inertia tensor is 4 / dx^2.
+Quadratic B-splines; D = diag(dx^2) / 4, so the inverse inertia tensor is 4 diag(1 / dx^2).
 """
 
 import warp as wp
 
+from fluidbench.particles import CARRIED, FREE
 from fluidbench.scene import Force, Phase, force_at
 
 from .. import constitutive
@@ -97,7 +98,8 @@ def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocit
     if phase.viscosity > 0.0:
         rate = 0.5 * (velocity_gradient + wp.transpose(velocity_gradient))
         mean = wp.trace(rate) / 3.0
-        tau += (2.0 * volume_ratio * phase.viscosity) * (rate - wp.diag(wp.vec3(mean, mean, mean)))
+        # A liquid that has cavitated (J > 1) must not break the bound on dt.
+        tau += (2.0 * wp.min(volume_ratio, 1.0) * phase.viscosity) * (rate - wp.diag(wp.vec3(mean, mean, mean)))
     return tau
 
 
@@ -126,8 +128,10 @@ def p2g(
     b = elastic_normal[p]
     s = elastic_shear[p]
     m = mass[p]
-    a = m * c
-    if held[p] == 0 and on:
+    a = wp.mat33()
+    if held[p] == FREE:
+        a = m * c
+    if held[p] != CARRIED and on:
         j *= wp.max(1.0 + h * wp.trace(c), 0.1)
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
@@ -141,9 +145,10 @@ def p2g(
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[p] = b
             elastic_shear[p] = s
-        a -= (4.0 * h * grid.inv_dx * grid.inv_dx * volume[p]) * kirchhoff(phase, j, b, s, c)
+        stress = kirchhoff(phase, j, b, s, c) * wp.diag(wp.cw_mul(grid.inv_dx, grid.inv_dx))
+        a -= (4.0 * h * volume[p]) * stress
     base = first_node(grid, position[p])
-    f = (position[p] - grid.origin) * grid.inv_dx - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
+    f = wp.cw_mul(position[p] - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
     wx0, wx1, wx2 = spline(f[0])
     wy0, wy1, wy2 = spline(f[1])
     wz0, wz1, wz2 = spline(f[2])
@@ -156,7 +161,7 @@ def p2g(
     run = run_of(wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1))
     if not on and not in_company():
         return
-    a *= grid.dx
+    a = a * wp.diag(grid.dx)
     momentum = m * velocity[p] - a * f
     for o in range(3):
         low = bx[o] == bx[0]
@@ -211,12 +216,13 @@ def grid_step(
             total = folded(grid, world, inside, touching, table, raw)
         result = wp.vec4(0.0, 0.0, 0.0, 0.0)
         if total[3] > 0.0:
-            place = grid.origin + grid.dx * wp.vec3(float(inside[0]), float(inside[1]), float(inside[2]))
+            place = wp.vec3(float(inside[0]), float(inside[1]), float(inside[2]))
+            place = grid.origin + wp.cw_mul(grid.dx, place)
             kick = dt[world] * force_at(force[world], place)
             v = wp.vec3(total[0], total[1], total[2]) / total[3] + kick
             if wall:
                 v = wall_velocity(grid, inside, touching, v)
-            density = total[3] * grid.inv_dx * grid.inv_dx * grid.inv_dx
+            density = total[3] * grid.inv_volume
             if wall:
                 density *= plane_share(grid, inside)
             result = wp.vec4(v[0], v[1], v[2], density)
@@ -243,7 +249,7 @@ def contained(grid: Grid, x: wp.vec3):
             elif out[axis] >= high:
                 out[axis] = out[axis] - (high - low)
         else:
-            skin = 1.0e-3 * grid.dx
+            skin = 1.0e-3 * grid.dx[axis]
             out[axis] = wp.clamp(out[axis], low + skin, high - skin)
     return out
 
@@ -272,8 +278,8 @@ def g2p(
         x = position[p]
         base = first_node(grid, x)
         v = velocity[p]
-        if held[p] == 0:
-            f = (x - grid.origin) * grid.inv_dx - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
+        if held[p] != CARRIED:  # what is clamped strains, but keeps its velocity
+            f = wp.cw_mul(x - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
             wx0, wx1, wx2 = spline(f[0])
             wy0, wy1, wy2 = spline(f[1])
             wz0, wz1, wz2 = spline(f[2])
@@ -303,8 +309,11 @@ def g2p(
                     cy += (wx[o] * wy[q] * (float(q) - f[1])) * vy
                 v += wx[o] * vx
                 cx += (wx[o] * (float(o) - f[0])) * vx
-            affine[p] = (4.0 * grid.inv_dx) * wp.matrix_from_cols(cx, cy, cz)
-            velocity[p] = v
+            affine[p] = wp.matrix_from_cols(cx, cy, cz) * wp.diag(4.0 * grid.inv_dx)
+            if held[p] == FREE:
+                velocity[p] = v
+            else:
+                v = velocity[p]
             j = volume_ratio[p]
             crowding = j * density / phases[world, phase_of[p]].density - 1.0 - feedback.tolerance
             if crowding > 0.0:

@@ -15,7 +15,7 @@ from fluidbench.timestep import Bound, damped_limit
 
 from ..order import CellOrder
 from . import kernels_warp as kernels
-from .grid import FAULT_BLOCKS, grid_of
+from .grid import FAULT_BLOCKS, cells_of, grid_of
 
 ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
 ISOLATED_VISCOUS = 0.25
@@ -48,17 +48,8 @@ class SolverMPM(Solver):
     typical_rate, typical_bytes = 3.5e6, 2500.0
 
     @classmethod
-    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
-        dx = config.grid_ratio * scenario.spacing
-        for axis, periodic in enumerate(scenario.domain.walls.periodic()):
-            cells = (scenario.domain.upper[axis] - scenario.domain.lower[axis]) / dx
-            if periodic and abs(cells - round(cells)) > 1e-3:
-                return f"the periodic {'xyz'[axis]} axis must hold a whole number of cells ({dx:g} m), not {cells:.4g}"
-        return None
-
-    @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        dx = config.grid_ratio * scenario.spacing
+        dx = float(cells_of(scenario.domain, config.grid_ratio * scenario.spacing)[1].min())
         acoustic = ISOLATED_ACOUSTIC * dx / (scenario.wave_speed + speed)
         nu = scenario.material.viscosity / scenario.material.density
         viscous = ISOLATED_VISCOUS * dx * dx / nu if nu > 0 else math.inf
@@ -83,7 +74,7 @@ class SolverMPM(Solver):
         self.scene, self.pool, self.config = scene, pool, config
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
         self.feedback = kernels.Feedback()
-        self.feedback.rate = config.volume_feedback * scene.wave_speed / self.grid.dx
+        self.feedback.rate = config.volume_feedback * scene.wave_speed / min(self.grid.dx)
         self.feedback.tolerance = config.volume_tolerance
         blocks = self.grid.blocks_per_world * scene.worlds
         slots = min(blocks, 512 + int(config.blocks_per_particle * pool.size))
@@ -98,7 +89,9 @@ class SolverMPM(Solver):
             self.raw = wp.empty(slots * 64, dtype=wp.vec4)
             self.moving = wp.empty(slots * 64, dtype=wp.vec4)
         self.started = False
-        self.order = CellOrder(scene, pool, self.grid.dx, shift=0.5)  # particles of one cell share their 27 nodes
+        self.order = CellOrder(
+            scene, pool, np.array(self.grid.dx), shift=0.5
+        )  # particles of one cell share their 27 nodes
         self.node_lanes = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
 
     def refresh(self) -> None:
@@ -203,10 +196,10 @@ class SolverMPM(Solver):
         return rest / self.pool.volume_ratio.numpy()
 
     def spins(self) -> np.ndarray:
-        """m dx^2 / 4 times the rotation of the affine field (Jiang et al. 2015)."""
-        c = self.pool.affine.numpy()
+        """m times the antisymmetric part of C D, D = diag(dx^2) / 4 (Jiang et al. 2015)."""
+        c = self.pool.affine.numpy() * (0.25 * np.array(self.grid.dx) ** 2)
         turn = np.stack([c[:, 2, 1] - c[:, 1, 2], c[:, 0, 2] - c[:, 2, 0], c[:, 1, 0] - c[:, 0, 1]], axis=1)
-        return 0.25 * self.grid.dx**2 * self.pool.mass.numpy()[:, None] * turn
+        return self.pool.mass.numpy()[:, None] * turn
 
     def footprint(self) -> dict[str, int]:
         return {name: getattr(self, name).capacity for name in ("table", "block_of", "raw", "moving")}

@@ -33,7 +33,7 @@ def grip(
     if kind == PERIODIC:
         hold = 0.0
     elif kind == STICK or kind == FRICTION:
-        filled = 2.0 * raw_node(grid, world, plane, table, raw)[3] * grid.inv_dx * grid.inv_dx * grid.inv_dx
+        filled = 2.0 * raw_node(grid, world, plane, table, raw)[3] * grid.inv_volume
         hold = wp.clamp((filled / rest_density - CONTACT_BEGINS) / (CONTACT_ENDS - CONTACT_BEGINS), 0.0, 1.0)
     return hold
 

@@ -7,6 +7,7 @@ Jacobi step a substep, `strain` and `pull`. Newtonian viscosity is mapped onto v
 
 import warp as wp
 
+from fluidbench.particles import CARRIED
 from fluidbench.scene import FRICTION, NEVER_YIELDS, PERIODIC, Box, Force, Phase, force_at
 
 from .. import constitutive
@@ -41,14 +42,25 @@ class Numbers:
     stiffness: float  # largest shear modulus that one Jacobi step conveys, over rho (d / dt)^2 [-]
 
 
+@wp.func
+def pushed(box: Box, free: wp.vec3, inside: wp.vec3):
+    """How far walls have moved a particle back inside; a periodic wrap is no motion."""
+    back = inside - free
+    for axis in range(3):
+        if box.lower_kind[axis] == PERIODIC:
+            back[axis] = 0.0
+    return back
+
+
 @wp.kernel
 def predict(
     num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    force: wp.array(dtype=Force), held: wp.array(dtype=int),
+    force: wp.array(dtype=Force), held: wp.array(dtype=int), velocity: wp.array(dtype=wp.vec3),
     # outputs
-    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), start: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """Velocity under gravity and the position it leads to."""
+    """Position under the present velocity and gravity. `motion` carries the displacement of the substep by itself: as a
+    difference of float32 positions it would lose the velocity at small dt."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world]:
@@ -56,9 +68,9 @@ def predict(
         v = velocity[i]
         if held[i] == 0:
             v += h * force_at(force[world], position[i])
-        velocity[i] = v
-        x = contained(box, position[i] + h * v, WALL_INSET * num.spacing)
-        start[i] = x - h * v  # so that a periodic wrap or a wall does not count as motion twice
+        free = position[i] + h * v
+        x = contained(box, free, WALL_INSET * num.spacing)
+        motion[i] = h * v + pushed(box, free, x)
         position[i] = x
 
 
@@ -132,7 +144,7 @@ def apply(
     num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), held: wp.array(dtype=int),
     correction: wp.array(dtype=wp.vec3),
     # outputs
-    position: wp.array(dtype=wp.vec3), start: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
     """Move by the correction, at most a quarter of a spacing, and stay inside the walls."""
     i = wp.tid()
@@ -144,24 +156,22 @@ def apply(
             shift = shift * (limit / length)
         free = position[i] + shift
         x = contained(box, free, WALL_INSET * num.spacing)
-        for axis in range(3):
-            if box.lower_kind[axis] == PERIODIC and x[axis] != free[axis]:
-                from_start = start[i]
-                from_start[axis] = from_start[axis] + x[axis] - free[axis]
-                start[i] = from_start
+        motion[i] = motion[i] + shift + pushed(box, free, x)
         position[i] = x
 
 
 @wp.kernel
 def velocities(
     capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), start: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3),
+    motion: wp.array(dtype=wp.vec3),
+    # outputs
+    velocity: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """v = (x - x_start) / dt."""
+    """v = displacement / dt."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == 0:
-        velocity[i] = (position[i] - start[i]) / dt[world]
+        velocity[i] = motion[i] / dt[world]
 
 
 @wp.func
@@ -225,7 +235,7 @@ def strain(
             tension = conveyed_modulus(num, phase.bulk_modulus, phase.density, dt[world]) * wp.max(volume_strain, 0.0)
         b = elastic_normal[i]
         s = elastic_shear[i]
-        if held[i] == 0:
+        if held[i] != CARRIED:
             b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
                 slope[0, 0], slope[0, 1], slope[0, 2], slope[1, 0], slope[1, 1], slope[1, 2], slope[2, 0], slope[2, 1],
                 slope[2, 2], b[0], b[1], b[2], s[0], s[1], s[2],

@@ -94,7 +94,7 @@ class SolverPBD(Solver):
             pool.add_field("elastic_shear", wp.vec3)
             pool.add_field("swelling", float)
         with wp.ScopedDevice(scene.device):
-            self.start = wp.zeros(pool.size, dtype=wp.vec3)
+            self.motion = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)
             self.smoothed = wp.zeros(pool.size, dtype=wp.vec3)
             self.multiplier = wp.zeros(pool.size, dtype=float)
@@ -134,8 +134,8 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         self._launch(
             kernels.predict,
-            [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held],
-            [pool.position, pool.velocity, self.start],
+            [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held, pool.velocity],
+            [pool.position, self.motion],
         )
 
     def lists(self) -> None:
@@ -163,15 +163,15 @@ class SolverPBD(Solver):
         self._launch(
             kernels.apply,
             [self.num, self.scene.box, *self._active(), pool.held, self.correction],
-            [pool.position, self.start],
+            [pool.position, self.motion],
         )
 
     def velocities(self) -> None:
         pool = self.pool
         self._launch(
             kernels.velocities,
-            [*self._active(), self.scene.dt, pool.held],
-            [pool.position, self.start, pool.velocity],
+            [*self._active(), self.scene.dt, pool.held, self.motion],
+            [pool.velocity],
         )
 
     def strain(self) -> None:
@@ -223,7 +223,7 @@ class SolverPBD(Solver):
         return rest * np.maximum(self.fill.numpy(), 1.0)
 
     def footprint(self) -> dict[str, int]:
-        own = ("start", "correction", "smoothed", "multiplier", "fill", "stress")
+        own = ("motion", "correction", "smoothed", "multiplier", "fill", "stress")
         return {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
 
 

@@ -10,12 +10,23 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, force_potential
+from fluidbench.particles import CARRIED
+from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at
 
 from .. import constitutive
 from ..bind import warp_func
 from ..corrected import mirrored_stress, symmetric_inverse
-from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, face_kind, image_position, image_velocity
+from ..neighbours import (
+    INDEX_BITS,
+    INDEX_MASK,
+    WALL_INSET,
+    Lists,
+    contained,
+    face_kind,
+    image_gradient,
+    image_position,
+    image_velocity,
+)
 from ..smoothing import wendland, wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -41,24 +52,8 @@ class Smoothing:
     density_feedback: float  # rate at which the integrated density follows the summed one, in c / h [-]
 
 
+FLOOR = wp.constant(0.1)  # least density over that at rest
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
-
-
-@wp.kernel
-def level(
-    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), force: wp.array(dtype=Force),
-    position: wp.array(dtype=wp.vec3), phase_of: wp.array(dtype=int), density: wp.array(dtype=float),
-    # outputs
-    dynamic_density: wp.array(dtype=float),
-):  # fmt: skip
-    """Density without what hydrostatic equilibrium adds along gravity, so that diffusion does not level that too
-    (Fourtakas et al. 2019, Comput. Fluids 190:346)."""
-    i = wp.tid()
-    world = i / capacity
-    if i - world * capacity < count[world]:
-        phase = phases[world, phase_of[i]]
-        layering = (phase.density * phase.density / phase.bulk_modulus) * force_potential(force[world], position[i])
-        dynamic_density[i] = density[i] - phase.density - layering
 
 
 @functools.cache
@@ -70,12 +65,15 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
         phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
         position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
-        density: wp.array(dtype=float), dynamic_density: wp.array(dtype=float),
+        density: wp.array(dtype=float), lift: wp.array(dtype=wp.vec3),
         # outputs
         elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
         new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
     ):  # fmt: skip
-        """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law."""
+        """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
+
+        Diffusion must not level the gradient that carries pressure, which is `lift` from both partners (see `move`).
+        """
         i = wp.tid()
         world = i / capacity
         if i - world * capacity < count[world]:
@@ -83,7 +81,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             x = position[i]
             v = velocity[i]
             rho = density[i]
-            dynamic = dynamic_density[i]
+            own_lift = lift[i]
             inv_h = 1.0 / num.h
             inflow = float(0.0)
             spread = float(0.0)
@@ -104,7 +102,10 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 u = v - vj
                 w = mass[j] * slope(wp.sqrt(wp.dot(r, r)) * inv_h, num.h)
                 inflow += w * wp.dot(u, r)
-                spread += w * (dynamic - dynamic_density[j])
+                lifts = lift[j]
+                if code > 0:
+                    lifts = image_gradient(box, lifts, code)
+                spread += w * (rho - density[j] - wp.dot(own_lift + lifts, r))
                 if wp.static(strength):
                     gradient -= wp.outer(w * u, r)
                     moment -= wp.outer(w * r, r)
@@ -123,14 +124,14 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 inflow += num.density_feedback * num.sound_speed / num.h * whole * drift
             h = dt[world]
             rate = inflow + 2.0 * num.density_diffusion * num.h * num.sound_speed * spread / rho
-            rho = wp.max(rho + h * rate, 0.1 * phase.density)
+            rho = wp.max(rho + h * rate, FLOOR * phase.density)
             new_density[i] = rho
             p = pressure(rho / phase.density - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
             scale = 1.0 / (rho * rho)
             if wp.static(strength):
                 b = elastic_normal[i]
                 s = elastic_shear[i]
-                if held[i] == 0:
+                if held[i] != CARRIED:
                     b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
                         gradient[0, 0], gradient[0, 1], gradient[0, 2], gradient[1, 0], gradient[1, 1],
                         gradient[1, 2], gradient[2, 0], gradient[2, 1], gradient[2, 2],
@@ -174,6 +175,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             inv_h = 1.0 / num.h
             tiny = 0.01 * num.h * num.h
             shock = num.artificial_viscosity * num.h * num.sound_speed / rho
+            friction = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
             inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
             pull = force_at(force[world], x)
             a = wp.vec3(0.0, 0.0, 0.0)
@@ -197,10 +199,9 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 # artificial viscosity, for approaching particles (Monaghan 1992)
                 scalar = shock * wp.min(ur, 0.0) / (r2 + tiny)
                 if wp.static(viscous):
-                    # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
-                    scalar += (
-                        10.0 * num.viscous_lattice * phase.viscosity * ur / ((r2 + 0.01 * tiny) * rho * density[j])
-                    )
+                    # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j), at rest density: a cavitated liquid, whose
+                    # density is low, would break the bound on dt
+                    scalar += friction * ur / (r2 + 0.01 * tiny)
                 push = wp.vec3(0.0, 0.0, 0.0)
                 if wp.static(strength):
                     other = stress[j]
@@ -227,13 +228,13 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 if wall[axis] != 0.0:
                     inward = wp.sign(0.5 * (box.lower[axis] + box.upper[axis]) - x[axis])
                     normal = wp.max(inward * wall[axis], 0.0)
-                    friction = box.lower_friction[axis]
+                    rub = box.lower_friction[axis]
                     if inward < 0.0:
-                        friction = box.upper_friction[axis]
+                        rub = box.upper_friction[axis]
                     slide = v + dt[world] * (a + pull)
                     slide[axis] = 0.0
                     speed = wp.length(slide)
-                    grip = wp.min(friction * normal, speed / dt[world])
+                    grip = wp.min(rub * normal, speed / dt[world])
                     a -= (grip / wp.max(speed, 1.0e-12)) * slide
                     a[axis] = a[axis] + inward * normal
             acceleration[i] = a + pull
@@ -253,19 +254,29 @@ def _named(function, name: str) -> wp.Kernel:
 @wp.kernel
 def move(
     box: Box, spacing: float, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    held: wp.array(dtype=int), acceleration: wp.array(dtype=wp.vec3),
-    new_density: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
+    held: wp.array(dtype=int), acceleration: wp.array(dtype=wp.vec3), new_density: wp.array(dtype=float),
     # outputs
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), density: wp.array(dtype=float),
+    lift: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """Symplectic Euler; a particle that would cross a wall stops at it."""
+    """Symplectic Euler; a particle that would cross a wall stops at it.
+
+    `lift` is half the density gradient of the pressure that carries the particle, rho^2 (g - a) / K: that of
+    hydrostatic equilibrium for a liquid at rest (Fourtakas et al. 2019, Comput. Fluids 190:346), none in free fall.
+    """
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world]:
         h = dt[world]
         v = velocity[i]
+        carried = wp.vec3(0.0, 0.0, 0.0)
         if held[i] == 0:
             v += h * acceleration[i]
+            phase = phases[world, phase_of[i]]
+            stiffness = 0.5 * phase.density * phase.density / phase.bulk_modulus
+            carried = stiffness * (force_at(force[world], position[i]) - acceleration[i])
+        lift[i] = carried
         free = position[i] + h * v
         x = contained(box, free, WALL_INSET * spacing)
         for axis in range(3):

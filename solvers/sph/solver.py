@@ -24,14 +24,14 @@ Ratio = Annotated[float, Field(ge=1.0, le=3.0)]
 
 
 class ConfigSPH(Config):
-    smoothing_ratio: Ratio = Field(1.2, description="smoothing length h over spacing, for liquids")
+    smoothing_ratio: Ratio = Field(1.8, description="smoothing length h over spacing, for liquids")
     smoothing_ratio_solid: Ratio = Field(1.3, description="the same for materials with shear stiffness")
     cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
     viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
     force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
     density_diffusion: NonNegative = Field(0.1, description="delta of delta-SPH")
-    artificial_viscosity: NonNegative = Field(0.02, description="alpha for liquids")
-    artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for materials with shear stiffness")
+    artificial_viscosity: NonNegative = Field(0.01, description="alpha for liquids")
+    artificial_viscosity_solid: NonNegative = Field(0.3, description="alpha for materials with shear stiffness")
     artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
     density_feedback: NonNegative = Field(
         0.02, description="rate, in c / h, at which integrated density follows the summed one (with shear stiffness)"
@@ -52,8 +52,8 @@ class SolverSPH(Solver):
     paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
     features = frozenset(Feature)
     Config: ClassVar = ConfigSPH
-    passes = ("lists", "level", "strain", "force", "move")
-    OWN: ClassVar = ("new_density", "dynamic_density", "load", "stress", "acceleration")
+    passes = ("lists", "strain", "force", "move")
+    OWN: ClassVar = ("new_density", "load", "stress", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
@@ -90,13 +90,14 @@ class SolverSPH(Solver):
         self.num.h = config.smoothing(scene.elastic) * scene.spacing
         self.num.spacing = scene.spacing
         second, fourth = lattice_moments(config.smoothing(scene.elastic))
-        self.num.lattice, self.num.viscous_lattice = 1.0 / second, 1.0 / fourth
+        self.num.lattice, self.num.viscous_lattice = 1.0 / second, fourth**-0.5
         self.num.sound_speed = scene.wave_speed
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.elastic)
         self.num.artificial_stress = config.artificial_stress
         self.num.density_feedback = config.density_feedback
         pool.add_field("density", float, scene.scenario.material.density)
+        pool.add_field("lift", wp.vec3)
         self._rest_densities()
         solid = pool.size if scene.elastic else 1
         if scene.elastic:
@@ -105,7 +106,6 @@ class SolverSPH(Solver):
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
             self.new_density = wp.zeros(pool.size, dtype=float)
-            self.dynamic_density = wp.zeros(pool.size, dtype=float)
             self.load = wp.zeros(pool.size, dtype=float)
             self.stress = wp.zeros(solid, dtype=wp.mat33)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
@@ -128,16 +128,6 @@ class SolverSPH(Solver):
     def lists(self) -> None:
         self.neighbours.update()
 
-    def level(self) -> None:
-        pool, scene = self.pool, self.scene
-        wp.launch(
-            kernels.level,
-            pool.size,
-            [pool.capacity, pool.count, scene.phases, scene.force, pool.position, pool.phase, pool.density],
-            [self.dynamic_density],
-            device=scene.device,
-        )
-
     def _common(self) -> list[Any]:
         pool, scene = self.pool, self.scene
         return [self.num, scene.box, self.pairs, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase]
@@ -148,7 +138,7 @@ class SolverSPH(Solver):
         wp.launch(
             self.kernels.strain,
             pool.size,
-            [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.density, self.dynamic_density],
+            [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.density, pool.lift],
             [*elastic, self.new_density, self.load, self.stress],
             device=self.scene.device,
         )
@@ -175,11 +165,14 @@ class SolverSPH(Solver):
                 pool.capacity,
                 pool.count,
                 scene.dt,
+                scene.phases,
+                pool.phase,
+                scene.force,
                 pool.held,
                 self.acceleration,
                 self.new_density,
             ],
-            [pool.position, pool.velocity, pool.density],
+            [pool.position, pool.velocity, pool.density, pool.lift],
             device=scene.device,
         )
 

@@ -30,6 +30,8 @@ MISTAKES = [
     (["compare", "line_bead", "--device", "cuda:7"], "no device 'cuda:7'"),
     (["run", "line_bead", "--out", "/proc/nowhere"], "cannot write"),
     (["show", "line_bead", "--set", "material.density=-3"], "material.density"),
+    (["validate", "free_fal"], "did you mean 'free_fall'"),
+    (["validate", "free_fall", "--levels", "finest"], "no level 'finest'"),
 ]
 
 
@@ -91,3 +93,19 @@ def test_list_show_and_doctor_answer():
     shown = fluidbench("show", "dam_break").stdout
     assert "wave speed" in shown and "acoustic" in shown and "substeps" in shown
     assert "warp-lang" in fluidbench("doctor").stdout
+
+
+def test_validate_writes_its_table_and_page_and_resumes(tmp_path):
+    command = ["validate", "constitutive_driver", "poiseuille_startup", "--solvers", "mpm", "--out", str(tmp_path)]
+    done = fluidbench(*command)
+    assert done.returncode == 0, done.stdout + done.stderr
+    table = pd.read_parquet(tmp_path / "validate.parquet")
+    assert list(table["case"]) == ["poiseuille_startup", "constitutive_driver"]
+    assert (table["verdict"] == "pass").all() and (table["error"] > 0).all()
+    rows = json.loads((tmp_path / "validate.json").read_text())
+    assert rows[0]["numbers"] and (tmp_path / rows[0]["runs"]["channel"] / "record.json").is_file()
+    page = (tmp_path / "report.html").read_text()
+    assert "Known answers" in page and 'src="http' not in page
+    records = {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}
+    assert fluidbench(*command).returncode == 0
+    assert records == {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}

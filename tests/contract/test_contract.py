@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fluidbench.particles import CLAMPED
 from fluidbench.process.stream import Stream
 from fluidbench.simulation import Simulation, Verdict
 from fluidbench.solver import configure, get_solver, solver_names
@@ -24,18 +25,18 @@ def drop(**table):
 
 @every_method
 def test_free_fall_is_exact_but_for_the_integrator(method):
-    """x = x0 + v0 t + g t (t + dt) / 2 for symplectic Euler, and the shape is kept (validation A)."""
+    """x = x0 + v0 t + g (t^2 + sum dt^2) / 2 for symplectic Euler, and the shape is kept (validation A)."""
     sim = Simulation(drop(), method)
     before = sim.pool.snapshot()
     sim.prepare()
-    steps = 0
+    squares = 0.0
     while sim.done < sim.ticks:
         plan = sim.advance()
-        steps += plan.substeps
+        squares += plan.substeps * plan.dt**2
         sim.look()
-    after, t, dt = sim.pool.snapshot(), sim.now, sim.now / steps
+    after, t = sim.pool.snapshot(), sim.now
     moved = center_of_mass(after) - center_of_mass(before)
-    expected = np.array([t, 0.0, 2.0 * t - G * t * (t + dt) / 2])
+    expected = np.array([t, 0.0, 2.0 * t - G * (t * t + squares) / 2])
     assert np.abs(moved - expected).max() < 2e-4 * G * t * t / 2 + 1e-6
     shape = [f["position"] - center_of_mass(f) for f in (before, after)]
     assert np.abs(shape[1] - shape[0]).max() / 0.05 < 5e-3
@@ -155,3 +156,37 @@ def test_bounds_are_named_and_explained(method):
 def test_footprint_counts_bytes(method):
     sim = Simulation(scenario(), method)
     assert all(size > 0 for size in sim.solver.footprint().values())
+
+
+@every_method
+def test_a_force_field_makes_a_drop_swing(method):
+    """In a pull -Omega^2 (x - x0) the centre of a drop swings as cos(Omega t), whatever happens inside."""
+    omega, centre = 20.0, np.array([0.2, 0.2, 0.2])
+    s = scenario(
+        domain={"lower": [0, 0, 0], "upper": [0.4, 0.4, 0.4]}, gravity=[0.0, 0.0, 0.0], duration=0.1,
+        bodies=[{"kind": "sphere", "center": [0.24, 0.2, 0.2], "radius": 0.04}],
+        body_force_gradient=np.diag([-(omega**2)] * 3).tolist(), body_force_center=centre.tolist(),
+    )  # fmt: skip
+    sim = Simulation(s, method)
+    start = center_of_mass(sim.pool.snapshot()) - centre
+    assert sim.run().verdict is Verdict.COMPLETED
+    end = center_of_mass(sim.pool.snapshot()) - centre
+    assert np.abs(end - start * np.cos(omega * sim.now)).max() < 0.02 * np.linalg.norm(start)
+
+
+@every_method
+def test_a_clamped_body_keeps_its_velocity(method):
+    """A clamp moves on at its own speed through gravity, and through what leans on it."""
+    bodies = [
+        {"kind": "box", "center": [0.06, 0.1, 0.1], "size": [0.04, 0.04, 0.04], "velocity": [0.1, 0, 0],
+         "clamped": True},
+        {"kind": "box", "center": [0.11, 0.1, 0.1], "size": [0.06, 0.04, 0.04]},
+    ]  # fmt: skip
+    s = scenario(bodies=bodies, material={"density": 1000.0, "youngs_modulus": 1e5}, duration=0.05)
+    sim = Simulation(s, method)
+    before = sim.pool.snapshot()
+    assert sim.run().verdict is Verdict.COMPLETED
+    after, clamped = sim.pool.snapshot(), before["held"] == CLAMPED
+    moved = after["position"][clamped] - before["position"][clamped]
+    assert np.allclose(moved, [0.1 * sim.now, 0.0, 0.0], atol=1e-5)
+    assert np.allclose(after["velocity"][clamped], [0.1, 0.0, 0.0])

@@ -134,3 +134,24 @@ def test_schedule_is_the_same_for_all_methods_and_divides_outputs():
 def test_sound_speed_follows_the_fastest_expected_speed():
     s = scenario()
     assert s.liquid_sound_speed == pytest.approx(10 * math.sqrt(9.81 * 0.09), rel=1e-6)
+
+
+def test_wave_and_gradient_add_to_the_velocity():
+    body = {
+        "kind": "box", "center": [0.1, 0.1, 0.1], "size": [0.1, 0.1, 0.1], "velocity": [1.0, 0.0, 0.0],
+        "wave": {"amplitude": [0.0, 2.0, 0.0], "number": [0.0, 0.0, 10.0], "phase": 0.5},
+    }  # fmt: skip
+    made = scenario(bodies=[body]).bodies[0]
+    at = made.velocity_at(np.array([[0.1, 0.1, 0.13]]))
+    assert np.allclose(at, [[1.0, 2.0 * np.sin(0.8), 0.0]])
+    assert made.top_speed == pytest.approx(3.0)
+
+
+def test_force_field_has_a_potential_whose_gradient_it_is():
+    pull = [[-9.0, 1.0, 0.0], [1.0, -4.0, 0.0], [0.0, 0.0, -1.0]]
+    s = scenario(body_force_gradient=pull, body_force_center=[0.1, 0.0, 0.05])
+    x, h = np.array([0.12, 0.07, 0.02]), 1e-6
+    slope = [(s.potential_at((x + h * e)[None]) - s.potential_at((x - h * e)[None]))[0] / (2 * h) for e in np.eye(3)]
+    assert np.allclose(slope, s.acceleration + np.array(pull) @ (x - [0.1, 0.0, 0.05]), atol=1e-6)
+    with pytest.raises(UserError, match="must be symmetric"):
+        scenario(body_force_gradient=[[0, 1, 0], [0, 0, 0], [0, 0, 0]])

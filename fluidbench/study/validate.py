@@ -1,0 +1,204 @@
+"""`validate`: cases with known answers through every method at several spacings: error, observed order, cost."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import UserError, suggestion
+from ..run import Job
+from ..scenario import Scenario
+from ..solver import configure, get_solver
+from ..store import Store, write_atomically
+from .case import METHOD_OF_LAW, Case, Finding, Run
+from .execute import Finished, Hooks, execute
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LEVELS = {"rough": 1.5, "coarse": 1.0, "medium": 1 / 1.5, "fine": 0.5}  # factors on a case's coarse spacing
+PASS, MISS, EXEMPT, SKIPPED = "pass", "MISS", "exempt", "skipped"
+
+
+@dataclass
+class Trial:
+    """One case through one method at one spacing: its jobs and, once they have ended, what came out."""
+
+    case: Case
+    method: str
+    level: str
+    spacing: float
+    jobs: dict[str, Job] = field(default_factory=dict)
+    verdict: str = ""
+    note: str = ""
+    finding: Finding | None = None
+    cost: dict[str, float] = field(default_factory=dict)
+    runs: dict[str, Finished] = field(default_factory=dict)
+
+    @property
+    def error(self) -> float:
+        return math.nan if self.finding is None else self.finding.error
+
+    @property
+    def tolerance(self) -> float:
+        return self.case.limit(self.method, self.spacing / self.case.spacing)
+
+
+def plan(
+    chosen: Sequence[Case], methods: Sequence[str], levels: Sequence[str], quick: bool, device: str,
+    wall_limit: float | None,
+) -> list[Trial]:  # fmt: skip
+    """Every trial with its jobs; a method that is skipped has none and says why."""
+    trials = []
+    for case in chosen:
+        if quick and case.quick is None:
+            continue
+        steps = {"quick": case.quick or case.spacing} if quick else {n: case.spacing * _factor(n) for n in levels}
+        for level, spacing in steps.items():
+            if case.drive is not None:
+                trials.append(Trial(case, METHOD_OF_LAW, level, spacing))
+                continue
+            assert case.scenarios is not None
+            for method in methods:
+                if quick and (method in case.skipped or method in case.exempt):
+                    continue
+                trial = Trial(case, method, level, spacing)
+                if method in case.skipped:
+                    trial.verdict, trial.note = SKIPPED, case.skipped[method]
+                else:
+                    trial.jobs = _jobs(case.scenarios(spacing), method, device, wall_limit)
+                trials.append(trial)
+    return trials
+
+
+def _factor(level: str) -> float:
+    if level not in LEVELS:
+        raise UserError(f"no level '{level}'{suggestion(level, LEVELS)}; there are {', '.join(LEVELS)}")
+    return LEVELS[level]
+
+
+def _jobs(scenarios: dict[str, Scenario], method: str, device: str, wall_limit: float | None) -> dict[str, Job]:
+    for scenario in scenarios.values():
+        configure(get_solver(method), scenario)
+    return {
+        label: Job(scenario.model_dump(mode="json"), method, device, wall_limit=wall_limit, keep_frames=True)
+        for label, scenario in scenarios.items()
+    }
+
+
+def run(
+    trials: Sequence[Trial], store: Store, workers: int, started: Callable[[int, Trial, bool], None],
+    progress: Callable[[int, dict], None], ended: Callable[[Trial], None],
+) -> None:  # fmt: skip
+    """Run all jobs and evaluate each trial as soon as its last job has ended."""
+    flat = [(trial, label) for trial in trials for label in trial.jobs]
+    lock = threading.Lock()
+
+    def job_ended(i: int, finished: Finished) -> None:
+        trial, label = flat[i]
+        with lock:
+            trial.runs[label] = finished
+            complete = len(trial.runs) == len(trial.jobs)
+        if complete:
+            evaluate(trial)
+            ended(trial)
+
+    for trial in trials:
+        if not trial.jobs:
+            if trial.case.drive is not None:
+                evaluate_law(trial)
+            ended(trial)
+    hooks = Hooks(lambda i, _job, reused: started(i, flat[i][0], reused), progress, job_ended)
+    execute([trial.jobs[label] for trial, label in flat], store, hooks, workers)
+
+
+def evaluate(trial: Trial) -> None:
+    """Judge a trial whose runs have all ended."""
+    records = [finished.record for finished in trial.runs.values()]
+    failed = [record for record in records if record["verdict"] != "completed"]
+    costs = [record["cost"] for record in records if "cost" in record]
+    simulated = sum(cost["simulated_s"] for cost in costs)
+    trial.cost = {
+        "particles": max((cost["peak_particles"] for cost in costs), default=0),
+        "substeps": sum(cost["substeps"] for cost in costs),
+        "wall_s": sum(cost["wall_s"] for cost in costs),
+        "cpu_s": sum(cost["cpu_s"] for cost in costs),
+        "wall_per_simulated_s": sum(cost["wall_s"] for cost in costs) / simulated if simulated else math.nan,
+    }
+    if failed:
+        trial.verdict, trial.note = failed[0]["verdict"], failed[0]["reason"]
+        return
+    assert trial.case.evaluate is not None
+    trial.finding = trial.case.evaluate({label: Run(trial.runs[label]) for label in trial.jobs})
+    _judge(trial)
+
+
+def evaluate_law(trial: Trial) -> None:
+    """Drive a law at one point, in this process."""
+    assert trial.case.drive is not None
+    start = time.perf_counter()
+    trial.finding = trial.case.drive(trial.spacing)
+    trial.cost = {"particles": 1, "wall_s": time.perf_counter() - start}
+    _judge(trial)
+
+
+def _judge(trial: Trial) -> None:
+    if trial.error <= trial.tolerance:
+        trial.verdict = PASS
+    elif trial.method in trial.case.exempt:
+        trial.verdict, trial.note = EXEMPT, trial.case.exempt[trial.method]
+    else:
+        trial.verdict, trial.note = MISS, trial.case.causes.get(trial.method, "no cause known")
+
+
+def orders(trials: Sequence[Trial]) -> dict[tuple[str, str], tuple[float, int]]:
+    """(case, method) -> (observed order, number of spacings): least-squares slope of log error over log spacing."""
+    groups: dict[tuple[str, str], list[Trial]] = {}
+    for trial in trials:
+        if trial.finding is not None and trial.error > 0:
+            groups.setdefault((trial.case.name, trial.method), []).append(trial)
+    return {
+        key: (float(np.polyfit(np.log([t.spacing for t in g]), np.log([t.error for t in g]), 1)[0]), len(g))
+        for key, g in groups.items()
+        if len(g) > 1
+    }
+
+
+def tidy(trials: Sequence[Trial]) -> pd.DataFrame:
+    """One row a trial."""
+    import pandas as pd
+
+    slopes = orders(trials)
+    rows = []
+    for t in trials:
+        slope, spacings = slopes.get((t.case.name, t.method), (math.nan, 1))
+        row = {
+            "case": t.case.name, "physics": t.case.physics, "method": t.method, "level": t.level,
+            "spacing_m": t.spacing, "error": t.error, "tolerance": t.tolerance, "measure": t.case.measure,
+            "order": slope, "order_spacings": spacings, "verdict": t.verdict, "note": t.note, "source": t.case.source,
+        }  # fmt: skip
+        rows.append(row | t.cost)
+    return pd.DataFrame(rows)
+
+
+def write_results(trials: Sequence[Trial], root: Path) -> None:
+    """The table as parquet, and everything measured as JSON."""
+    import io
+
+    buffer = io.BytesIO()
+    table = tidy(trials)
+    table.to_parquet(buffer)
+    write_atomically(root / "validate.parquet", buffer.getvalue())
+    rows = json.loads(str(table.to_json(orient="records")))
+    for row, trial in zip(rows, trials, strict=True):
+        row["numbers"] = [asdict(n) for n in trial.finding.numbers] if trial.finding else []
+        row["runs"] = {label: r.folder.relative_to(root).as_posix() for label, r in trial.runs.items()}
+    write_atomically(root / "validate.json", json.dumps(rows, indent=1))

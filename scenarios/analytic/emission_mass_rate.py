@@ -1,0 +1,53 @@
+"""A nozzle extruding without gravity, at rest and moving: mass rho Q t to one layer (validation A, exact)."""
+
+import numpy as np
+
+from fluidbench.particles import CARRIED
+from fluidbench.scenario import Scenario
+from fluidbench.study.case import Case, Finding, Number, Run, scenario
+
+RADIUS, EXIT, TIME = 0.004, 0.1, 0.4
+
+
+def scenarios(spacing: float) -> dict[str, Scenario]:
+    def nozzle(speed: float, end: float) -> Scenario:
+        return scenario(
+            "emission_mass_rate", domain={"lower": [-0.01, -0.01, 0], "upper": [0.06, 0.01, 0.08]},
+            material={"density": 1000.0}, gravity=[0.0, 0.0, 0.0],
+            nozzle={"diameter": 2 * RADIUS, "exit_speed": EXIT, "standoff": 0.06},
+            toolpath={"kind": "line", "start": [0.0, 0.0], "end": [end, 0.0], "speed": speed},
+            duration=TIME, output_interval=TIME / 8, spacing=spacing,
+        )  # fmt: skip
+
+    return {"slow": nozzle(0.01, 0.01), "moving": nozzle(0.1, 0.05)}
+
+
+def evaluate(runs: dict[str, Run]) -> Finding:
+    """Worst of all outputs: mass off by how many layers; momentum and closest approach beside it."""
+    from scipy.spatial import cKDTree
+
+    worst, numbers = 0.0, []
+    for label, run in runs.items():
+        layer = 1000.0 * np.pi * RADIUS**2 * run.scenario.spacing
+        for frame in run.frames[1:]:
+            free = frame["held"] != CARRIED
+            mass = frame["mass"][free].astype(float).sum()
+            worst = max(worst, abs(mass - 1000.0 * np.pi * RADIUS**2 * EXIT * float(frame["time"])) / layer)
+        last = run.frames[-1]
+        free = last["held"] != CARRIED
+        mass = last["mass"][free].astype(float)
+        fresh = last["position"][free & (last["birth_time"] > TIME - 5 * run.scenario.spacing / EXIT)]
+        closest = cKDTree(fresh).query(fresh, k=2)[0][:, 1].min() / run.scenario.spacing
+        numbers += [
+            Number(f"{label}: mass [kg]", mass.sum(), 1000.0 * np.pi * RADIUS**2 * EXIT * TIME),
+            Number(f"{label}: downward momentum [kg m/s]", -float(mass @ last["velocity"][free, 2]), mass.sum() * EXIT),
+            Number(f"{label}: closest of the last layers over d (at least 0.7)", float(closest), 1.0),
+        ]
+    return Finding(worst, tuple(numbers))
+
+
+CASE = Case(
+    "emission_mass_rate", "a nozzle extruding without gravity, slow and fast", "emission", "exact; validation A",
+    "|m - rho Q t| in layers of one spacing, worst output",
+    spacing=RADIUS / 4, tolerance=1.0, scenarios=scenarios, evaluate=evaluate, quick=RADIUS / 4,
+)  # fmt: skip

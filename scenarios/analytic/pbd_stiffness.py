@@ -1,0 +1,52 @@
+"""How far a PBD liquid settles under its weight: proportional to dt^2 / n (validation I)."""
+
+import numpy as np
+
+from fluidbench.scenario import Scenario
+from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+
+HEIGHT, SIDE = 0.2, 0.08
+TICKS, ITERATIONS = (4e-3, 2e-3), (4, 8, 16)
+
+
+def scenarios(spacing: float) -> dict[str, Scenario]:
+    def tank(tick: float, iterations: int) -> Scenario:
+        return scenario(
+            "pbd_stiffness", domain={"lower": [0, 0, 0], "upper": [SIDE, SIDE, 0.3], "walls": {"z_lower": "slip"}},
+            material={"density": 1000.0}, tick=tick, duration=1.2, output_interval=0.04, spacing=spacing,
+            bodies=[{"kind": "box", "center": [SIDE / 2, SIDE / 2, HEIGHT / 2], "size": [SIDE, SIDE, HEIGHT]}],
+            numerics={"pbd": {"iterations": iterations, "advance": 1.0}},
+        )  # fmt: skip
+
+    return {f"{tick} {n}": tank(tick, n) for tick in TICKS for n in ITERATIONS}
+
+
+def evaluate(runs: dict[str, Run]) -> Finding:
+    """Settlement must scale as dt^2 / n, apart from the packing that the lattice finds whatever dt."""
+    load, sunk = [], []
+    for label, run in runs.items():
+        n = int(label.split()[1])
+        late = [frame["position"][:, 2].mean() for frame in run.frames if float(frame["time"]) > 0.5]
+        load.append(9.81 * run.dt**2 / (n * run.scenario.spacing**2))
+        sunk.append(1 - float(np.mean(late)) / (HEIGHT / 2))
+    load, sunk = np.array(load), np.array(sunk)
+    slope, packing = np.polyfit(load, sunk, 1)
+    fitted = slope * load + packing
+    error = float((np.abs(sunk - fitted) / (slope * load)).max())
+    numbers = (
+        Number("kappa in c_eff = kappa d sqrt(n) / dt", float(np.sqrt(2 * HEIGHT / (3 * slope))), 0.5),
+        Number("packing left at dt = 0", float(packing), 0.0),
+    )
+    order = np.argsort(load)
+    x, y = load[order], sunk[order]
+    curve = Curve("settlement", "g dt^2 / (n d^2) [1/m]", "settlement / H", x, y, x, fitted[order])
+    return Finding(error, numbers, (curve,))
+
+
+ONLY = "the case measures the numerical stiffness of position-based dynamics"
+CASE = Case(
+    "pbd_stiffness", "settlement of a PBD liquid against dt and iterations", "numerics",
+    "scaling dt^2 / n; validation I", "largest departure from the scaling", spacing=0.01, tolerance=0.2,
+    scenarios=scenarios, evaluate=evaluate,
+    skipped={"mpm": ONLY, "sph": ONLY},
+)  # fmt: skip

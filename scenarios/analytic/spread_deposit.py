@@ -1,0 +1,51 @@
+"""Final shape of a soft yield-stress deposit (second-order theory of thin deposits)."""
+
+import numpy as np
+
+from fluidbench.library import load
+from fluidbench.measure.ledger import deposit_of
+from fluidbench.measure.profiles import relative_l2
+from fluidbench.measure.reference import table
+from fluidbench.measure.slump import radial_heights
+from fluidbench.scenario import Scenario
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
+
+HEIGHT, TAU = 0.1, 0.05
+
+
+def scenarios(spacing: float) -> dict[str, Scenario]:
+    settings = {"spacing": spacing, "material.yield_stress": TAU * 981.0, "duration": 2.0}
+    return {"deposit": load("column_slump", settings)}
+
+
+def profile(radius: np.ndarray, front: float) -> np.ndarray:
+    """h = p + sqrt(p^2 + 2 B (R - r)), B = tau_y / (rho g), p = sqrt(3) pi B / 4 [m]; zero beyond R."""
+    b = TAU * HEIGHT
+    p = np.sqrt(3.0) * np.pi * b / 4.0
+    return np.where(radius <= front, p + np.sqrt(p * p + 2.0 * b * np.maximum(front - radius, 0.0)), 0.0)
+
+
+def evaluate(runs: dict[str, Run]) -> Finding:
+    """|R - R_ref| / R_ref against the volume-of-fluid computation; the theory's profile beside it."""
+    run = runs["deposit"]
+    data = table("viscoplastic_slump_crosscheck").set_index("tau_prime").loc[TAU]
+    front = run.record["measures"]["spread_radius_m"]
+    radius, height = radial_heights(deposit_of(run.frames[-1], run.scenario), 0.0, 0.0)
+    inside = radius < data["spread_vof"] * HEIGHT - 2 * run.scenario.spacing
+    theory = profile(radius, data["spread_second"] * HEIGHT)
+    numbers = (
+        Number("R / H", front / HEIGHT, float(data["spread_vof"])),
+        Number("R / H, second-order theory", front / HEIGHT, float(data["spread_second"])),
+        Number("slump", run.record["measures"]["slump"], float(data["slump_vof"])),
+        Number("E2 of the profile against the theory", relative_l2(height[inside], theory[inside]), 0.0),
+    )
+    curve = Curve("profile", "r [m]", "h [m]", radius, height, radius, theory)
+    return Finding(abs(front / HEIGHT / float(data["spread_vof"]) - 1.0), numbers, (curve,))
+
+
+CASE = Case(
+    "spread_deposit", "final shape of a soft yield-stress deposit", "yield stress",
+    "volume-of-fluid computation (viscoplastic_slump_crosscheck.csv); Roussel & Coussot 2005, Dubash et al. 2009",
+    "|R / R_ref - 1| at tau' = 0.05", spacing=HEIGHT / 20, tolerance=0.08, scenarios=scenarios, evaluate=evaluate,
+    exempt={"pbd": "shear stiffness is limited by the time step"},
+)  # fmt: skip
