@@ -64,6 +64,7 @@ def summary(trials: Sequence[Trial]) -> Table:
 def present(trials: Sequence[Trial], root: Path, console: Console) -> bool:
     """Print and write everything; True when no trial missed its tolerance or failed."""
     write_results(trials, root)
+    write_markdown(trials, root)
     page = write_page(trials, root)
     show(console, summary(trials))
     for trial in trials:
@@ -71,6 +72,32 @@ def present(trials: Sequence[Trial], root: Path, console: Console) -> bool:
             console.print(f"{trial.case.name} {trial.method}: {trial.verdict}: {trial.note}", markup=False)
     console.print(f"report: {page}", markup=False, highlight=False, soft_wrap=True)
     return all(t.verdict in (PASS, "exempt", "skipped") for t in trials)
+
+
+def write_markdown(trials: Sequence[Trial], root: Path) -> Path:
+    """validate.md: the table with what it was measured on, for docs/validation.md."""
+    machine = _machine(trials)
+    table = summary(trials)
+    head = ["case", "physics", *table.head[1:], "measure", "source"]
+    lines = [
+        "# Known answers", "",
+        "Made by `fluidbench validate --out OUT`, which writes this file as `OUT/validate.md`; `OUT/report.html` holds",
+        "the profiles and the work-precision diagrams. A row alone: `fluidbench validate CASE --solvers METHOD`.", "",
+        f"{machine.get('time', '')[:10]}, fluidbench {machine.get('fluidbench', '')}, Warp {machine.get('warp', '')}, "
+        f"Python {machine.get('python', '')}, {machine.get('device', '')} ({machine.get('cores', '')} cores).", "",
+        f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}",
+    ]  # fmt: skip
+    for trial, row in zip(trials, table.rows, strict=True):
+        cells = [row[0], trial.case.physics, *row[1:], trial.case.measure, trial.case.source]
+        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+    notes = dict.fromkeys(f"- {t.case.name}, {t.method}: {t.verdict}: {t.note}" for t in trials if t.note)
+    write_atomically(root / "validate.md", "\n".join([*lines, "", table.note + ".", "", *notes, ""]))
+    return root / "validate.md"
+
+
+def _machine(trials: Sequence[Trial]) -> dict[str, str]:
+    """What the first run that says so was made on."""
+    return next((r.record["machine"] for t in trials for r in t.runs.values() if "machine" in r.record), {})
 
 
 def write_page(trials: Sequence[Trial], root: Path) -> Path:
@@ -90,11 +117,10 @@ def write_page(trials: Sequence[Trial], root: Path) -> Path:
             "table": _numbers(own), "plots": [Markup(plotly_html(plot)) for plot in drawn],
             "notes": [f"{t.method}: {t.verdict}: {t.note}" for t in own if t.note],
         })  # fmt: skip
-    machines = [r.record["machine"] for t in trials for r in t.runs.values() if "machine" in r.record]
     text = environment({"page": PAGE}).get_template("page").render(
         title="fluidbench validate", subtitle="Cases with known answers through every method.", table=summary(trials),
         cases=sections, script=script(),
-        machine="; ".join(f"{k} {v}" for k, v in machines[0].items()) if machines else "",
+        machine="; ".join(f"{k} {v}" for k, v in _machine(trials).items()),
     )  # fmt: skip
     write_atomically(root / "report.html", text)
     return root / "report.html"

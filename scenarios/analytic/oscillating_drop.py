@@ -48,5 +48,5 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 CASE = Case(
     "oscillating_drop", "an inviscid sphere oscillating in a central force", "liquid",
     "exact; Monaghan & Rafiee 2013, axisymmetric form derived in validation B", "relative error of the period",
-    spacing=RADIUS / 8, tolerance=0.03, fine_tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
+    spacing=RADIUS / 10, tolerance=0.03, fine_tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
 )  # fmt: skip

@@ -85,6 +85,16 @@ def slots_of(table: wp.array(dtype=int), start: int, bx: wp.vec3i, by: wp.vec3i,
 
 
 @wp.func
+def columns_scaled(m: wp.mat33, by: wp.vec3):
+    """m diag(by)."""
+    return wp.mat33(
+        m[0, 0] * by[0], m[0, 1] * by[1], m[0, 2] * by[2],
+        m[1, 0] * by[0], m[1, 1] * by[1], m[1, 2] * by[2],
+        m[2, 0] * by[0], m[2, 1] * by[1], m[2, 2] * by[2],
+    )  # fmt: skip
+
+
+@wp.func
 def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocity_gradient: wp.mat33):
     """Kirchhoff stress [Pa] from J, the elastic tensor (b: diagonal, s: xy, xz, yz) and the velocity gradient."""
     p = volume_ratio * pressure(1.0 / volume_ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
@@ -145,8 +155,7 @@ def p2g(
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[p] = b
             elastic_shear[p] = s
-        stress = kirchhoff(phase, j, b, s, c) * wp.diag(wp.cw_mul(grid.inv_dx, grid.inv_dx))
-        a -= (4.0 * h * volume[p]) * stress
+        a -= columns_scaled(kirchhoff(phase, j, b, s, c), (4.0 * h * volume[p]) * wp.cw_mul(grid.inv_dx, grid.inv_dx))
     base = first_node(grid, position[p])
     f = wp.cw_mul(position[p] - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
     wx0, wx1, wx2 = spline(f[0])
@@ -161,7 +170,7 @@ def p2g(
     run = run_of(wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1))
     if not on and not in_company():
         return
-    a = a * wp.diag(grid.dx)
+    a = columns_scaled(a, grid.dx)
     momentum = m * velocity[p] - a * f
     for o in range(3):
         low = bx[o] == bx[0]
@@ -309,7 +318,7 @@ def g2p(
                     cy += (wx[o] * wy[q] * (float(q) - f[1])) * vy
                 v += wx[o] * vx
                 cx += (wx[o] * (float(o) - f[0])) * vx
-            affine[p] = wp.matrix_from_cols(cx, cy, cz) * wp.diag(4.0 * grid.inv_dx)
+            affine[p] = columns_scaled(wp.matrix_from_cols(cx, cy, cz), 4.0 * grid.inv_dx)
             if held[p] == FREE:
                 velocity[p] = v
             else:

@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 from pydantic import Field
 
+from fluidbench.material import Material
 from fluidbench.particles import Pool
 from fluidbench.scenario import Scenario
 from fluidbench.scene import Scene
@@ -25,21 +26,24 @@ Ratio = Annotated[float, Field(ge=1.0, le=3.0)]
 
 class ConfigSPH(Config):
     smoothing_ratio: Ratio = Field(1.8, description="smoothing length h over spacing, for liquids")
-    smoothing_ratio_solid: Ratio = Field(1.3, description="the same for materials with shear stiffness")
+    smoothing_ratio_solid: Ratio = Field(1.5, description="the same for materials with shear stiffness")
     cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
     viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
     force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
     density_diffusion: NonNegative = Field(0.1, description="delta of delta-SPH")
     artificial_viscosity: NonNegative = Field(0.01, description="alpha for liquids")
-    artificial_viscosity_solid: NonNegative = Field(0.3, description="alpha for materials with shear stiffness")
+    artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for solids and pastes")
+    artificial_viscosity_viscoelastic: NonNegative = Field(0.3, description="alpha for liquids that relax")
     artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
     density_feedback: NonNegative = Field(
         0.02, description="rate, in c / h, at which integrated density follows the summed one (with shear stiffness)"
     )
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
 
-    def alpha(self, solid: bool) -> float:
-        return self.artificial_viscosity_solid if solid else self.artificial_viscosity
+    def alpha(self, material: Material) -> float:
+        if material.relaxation_time is not None:
+            return self.artificial_viscosity_viscoelastic
+        return self.artificial_viscosity if material.youngs_modulus is None else self.artificial_viscosity_solid
 
     def smoothing(self, solid: bool) -> float:
         return self.smoothing_ratio_solid if solid else self.smoothing_ratio
@@ -64,7 +68,7 @@ class SolverSPH(Solver):
         solid = m.youngs_modulus is not None
         h = config.smoothing(solid) * scenario.spacing
         # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1).
-        nu = m.viscosity / m.density + config.alpha(solid) * h * c / 10.0
+        nu = m.viscosity / m.density + config.alpha(m) * h * c / 10.0
         g = scenario.peak_acceleration
         a = config
         return [
@@ -93,7 +97,7 @@ class SolverSPH(Solver):
         self.num.lattice, self.num.viscous_lattice = 1.0 / second, fourth**-0.5
         self.num.sound_speed = scene.wave_speed
         self.num.density_diffusion = config.density_diffusion
-        self.num.artificial_viscosity = config.alpha(scene.elastic)
+        self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.artificial_stress = config.artificial_stress
         self.num.density_feedback = config.density_feedback
         pool.add_field("density", float, scene.scenario.material.density)

@@ -17,7 +17,7 @@ def test_cuda_agrees_with_the_cpu(name):
     for device in ("cpu", "cuda:0"):
         sim = Simulation(s, name, device)
         assert sim.run().verdict is Verdict.COMPLETED
-        frame = sim.pool.snapshot()
+        frame = sim.frame()
         rows.append({**ledger(frame, s), **lengths(frame, s)})
     assert rows[0]["mass_kg"] == rows[1]["mass_kg"]
     for key in ("top_m", "center_x_m", "center_z_m"):
