@@ -88,7 +88,7 @@ def validate(
     trials = plan(select(cases or []), methods, _split(levels), quick, device, wall_limit)
     store = Store((out or Path("fluidbench-out") / "validate").resolve())
     _validate(trials, store, jobs or (2 if device == "cpu" else 1), Console(stderr=True))
-    if not present(trials, store.root, Console()):
+    if not present(trials, store.root, Console(width=None if sys.stdout.isatty() else 120)):
         raise typer.Exit(1)
 
 

@@ -29,9 +29,10 @@ def show(console: Console, table: Table) -> None:
     from rich.markup import escape
     from rich.table import Table as RichTable
 
+    wide = console.width >= 100  # on a narrow screen even names must fold
     shown = RichTable(title=table.title, title_justify="left", title_style="bold")
     for i, head in enumerate(table.head):
-        shown.add_column(escape(head), justify="left" if i == 0 else "right", overflow="fold")
+        shown.add_column(escape(head), justify="left" if i == 0 else "right", overflow="fold", no_wrap=i == 0 and wide)
     for row in table.rows:
         shown.add_row(*map(escape, row))
     console.print(shown)

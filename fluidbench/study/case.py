@@ -120,11 +120,11 @@ class Case:
     quick: float | None = None
 
     def limit(self, method: str, level_factor: float) -> float:
-        """The error allowed for a method at a spacing of `level_factor` times the coarse one."""
-        if method in self.tolerances:
-            return self.tolerances[method]
-        fine = self.tolerance if self.fine_tolerance is None else self.fine_tolerance
-        return fine if level_factor <= 0.5 else self.tolerance
+        """The error allowed for a method at `level_factor` times the coarse spacing; above 1, in proportion."""
+        coarse = self.tolerances.get(method, self.tolerance)
+        if level_factor <= 0.5 and method not in self.tolerances and self.fine_tolerance is not None:
+            return self.fine_tolerance
+        return coarse * max(level_factor, 1.0)
 
 
 def cases() -> dict[str, Case]:

@@ -46,5 +46,6 @@ CASE = Case(
     "viscous_release", "a viscous cylinder released on a no-slip floor", "viscous",
     "lubrication theory; Huppert 1982, initial shape: Ball & Huppert 2019", "largest |r_N / r_ref - 1|, t* = 1 .. 5",
     spacing=HEIGHT / 12, tolerance=0.05, fine_tolerance=0.02, scenarios=scenarios, evaluate=evaluate, quick=HEIGHT / 8,
+    causes={"mpm": "floor of the theory: at t* = 1 inertia and H0 / R0 = 0.5 put it 2.6 % off, at t* = 5 0.5 %"},
     exempt={"pbd": "velocity smoothing makes the viscosity depend on dt; the exponent is reported"},
 )  # fmt: skip
