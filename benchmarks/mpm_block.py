@@ -13,8 +13,9 @@ import time
 
 import warp as wp
 
+from fluidbench.body import Body
 from fluidbench.material import Material
-from fluidbench.scenario import Body, Domain, Scenario
+from fluidbench.scenario import Domain, Scenario
 from fluidbench.simulation import Simulation
 
 SPACING, CELLS, DT, SUBSTEPS = 7e-3, 64, 1e-4, 10

@@ -8,8 +8,9 @@ import json
 
 import warp as wp
 
+from fluidbench.body import Body
 from fluidbench.material import Material
-from fluidbench.scenario import Body, Domain, Scenario, Walls
+from fluidbench.scenario import Domain, Scenario, Walls
 from fluidbench.simulation import Simulation
 
 

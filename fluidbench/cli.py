@@ -110,14 +110,16 @@ def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None
 
         def step(i: int, state: dict[str, Any]) -> None:
             progress.update(tasks[i], completed=int(100 * state["time"] / state["until"]))
-            if state["time"] >= state["until"]:
+
+        def stopped(i: int) -> None:
+            if i in tasks:
                 progress.remove_task(tasks.pop(i))
 
         def ended(trial: Any) -> None:
             progress.advance(overall)
             console.print(line(trial), markup=False, highlight=False, soft_wrap=True)
 
-        run(trials, store, workers, started, step, ended)
+        run(trials, store, workers, started, step, stopped, ended)
 
 
 @app.command("list")

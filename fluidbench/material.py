@@ -62,6 +62,11 @@ class Material(BaseModel):
         return math.sqrt((self.bulk(liquid_sound_speed) + 4.0 * self.shear_modulus / 3.0) / self.density)
 
     @property
+    def is_solid(self) -> bool:
+        """Whether it never flows: elastic, without yield stress or relaxation."""
+        return self.youngs_modulus is not None and self.yield_stress is None and self.relaxation_time is None
+
+    @property
     def flow_threshold(self) -> float:
         """Shear stress at which it flows plastically [Pa]: infinite for elastic matter, 0 for a liquid."""
         if self.youngs_modulus is None:

@@ -65,6 +65,12 @@ def force_potential(force: Force, x: wp.vec3):
     return wp.dot(force.uniform + 0.5 * (force.gradient * x), x)
 
 
+@wp.func
+def is_solid(phase: Phase):
+    """Whether the material never flows: it remembers shape and volume for ever, and nothing may relax them."""
+    return phase.yield_stress >= NEVER_YIELDS and phase.relaxation_rate == 0.0
+
+
 class Scene:
     """What a solver sees of the scenarios. `dt`, `force` and `phases` are device arrays, so that a captured graph
     survives a change of their values."""
@@ -117,6 +123,16 @@ class Scene:
     def elastic(self) -> bool:
         """Whether any world has shear stiffness."""
         return any(s.material.youngs_modulus is not None for s in self.scenarios)
+
+    @property
+    def solid(self) -> bool:
+        """Whether any world's material never flows."""
+        return any(s.material.is_solid for s in self.scenarios)
+
+    @property
+    def flowing(self) -> bool:
+        """Whether any world's material has shear stiffness and flows."""
+        return any(s.material.youngs_modulus is not None and not s.material.is_solid for s in self.scenarios)
 
     @property
     def viscous(self) -> bool:

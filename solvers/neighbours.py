@@ -95,6 +95,23 @@ def image_gradient(box: Box, g: wp.vec3, code: int):
 
 
 @wp.func
+def image_rate(box: Box, g: wp.mat33, code: int):
+    """A velocity gradient dv_i/dx_j seen in the walls, consistent with `image_velocity`."""
+    out = g
+    for axis in range(3):
+        kind = face_kind(box, code, axis)
+        if kind != PERIODIC:
+            for b in range(3):
+                out[b, axis] = -out[b, axis]
+            if kind == STICK:
+                out = -1.0 * out
+            else:
+                for b in range(3):
+                    out[axis, b] = -out[axis, b]
+    return out
+
+
+@wp.func
 def contained(box: Box, x: wp.vec3, inset: float):
     """A position wrapped along periodic axes and kept `inset` in front of walls, so it never meets its own image."""
     out = x

@@ -49,6 +49,19 @@ def crossings(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
     return time[i] - value[i] * (time[i + 1] - time[i]) / (value[i + 1] - value[i])
 
 
+def damped_swing(time: np.ndarray, signal: np.ndarray, period: float) -> tuple[float, float, float]:
+    """(rest, period [s], decay [1/s]) of rest - amplitude exp(-decay t) cos(2 pi t / period), fitted from a first guess
+    of the period; whatever creeps is left out as a linear drift."""
+    from scipy.optimize import curve_fit
+
+    def swing(t, rest, amplitude, decay, cycles, drift):
+        return rest + drift * t - amplitude * np.exp(-decay * t) * np.cos(2 * np.pi * cycles * t)
+
+    clock, half = time / period, float(np.ptp(signal)) / 2
+    fitted, _ = curve_fit(swing, clock, signal, [half, half, 0.1, 1.0, 0.0], maxfev=20000)
+    return float(fitted[0]), float(period / abs(fitted[3])), float(fitted[2] / period)
+
+
 def period(time: np.ndarray, signal: np.ndarray) -> float:
     """Mean period of an oscillation [s]; NaN with fewer than two passages through the mean."""
     passed = crossings(time, signal)

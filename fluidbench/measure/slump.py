@@ -33,13 +33,17 @@ def spread_radius(deposit: Deposit, x0: float, y0: float) -> float:
 
 
 def radial_heights(deposit: Deposit, x0: float, y0: float) -> tuple[np.ndarray, np.ndarray]:
-    """(radius (n,), azimuthally averaged height (n,)) [m] about a vertical axis, one ring a cell."""
+    """(mean radius (n,), azimuthally averaged height (n,)) [m] of rings one cell wide about a vertical axis."""
     x, y, heights = deposit.column_heights()
     radius = np.hypot(x[:, None] - x0, y[None, :] - y0)
     ring = np.rint(radius / deposit.spacing).astype(int)
-    count = np.maximum(np.bincount(ring.ravel()), 1)
-    mean = np.bincount(ring.ravel(), heights.ravel()) / count
-    return np.arange(len(mean)) * deposit.spacing, mean
+    cells = np.bincount(ring.ravel())
+    full = cells > 0
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.bincount(ring.ravel(), values.ravel())[full] / cells[full]
+
+    return mean(radius), mean(heights)
 
 
 def _falls_below(x: np.ndarray, values: np.ndarray, level: float) -> float:

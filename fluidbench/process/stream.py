@@ -24,7 +24,10 @@ def disc(radius: float, spacing: float) -> np.ndarray:
         if best is None or error < best[0] - 1e-12:
             best = (error, np.stack([x[inside], y[inside]], axis=1))
     assert best is not None
-    return best[1]
+    points = best[1]
+    # Stretched by a percent or so until each point owns its share of the area: what reads density from positions would
+    # otherwise find the disc too full, and burst.
+    return points * np.sqrt(np.pi * radius**2 / (len(points) * spacing**2))
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def _jobs(scenarios: dict[str, Scenario], method: str, device: str, wall_limit: 
 
 def run(
     trials: Sequence[Trial], store: Store, workers: int, started: Callable[[int, Trial, bool], None],
-    progress: Callable[[int, dict], None], ended: Callable[[Trial], None],
+    progress: Callable[[int, dict], None], stopped: Callable[[int], None], ended: Callable[[Trial], None],
 ) -> None:  # fmt: skip
     """Run all jobs and evaluate each trial as soon as its last job has ended."""
     flat = [(trial, label) for trial in trials for label in trial.jobs]
@@ -104,6 +104,7 @@ def run(
 
     def job_ended(i: int, finished: Finished) -> None:
         trial, label = flat[i]
+        stopped(i)
         with lock:
             trial.runs[label] = finished
             complete = len(trial.runs) == len(trial.jobs)

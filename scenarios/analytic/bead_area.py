@@ -25,6 +25,6 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 CASE = Case(
     "bead_area", "cross-section of a steady bead of paste", "emission", "exact; conservation of volume",
-    "|A / (Q/V) - 1|", spacing=1.5e-3, tolerance=0.03, fine_tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
+    "|A / (Q/V) - 1|", spacing=1.5e-3, tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
     quick=2.0e-3,
 )  # fmt: skip

@@ -38,6 +38,6 @@ CASE = Case(
     "bead_strand_shape", "width of a viscous strand laid through a narrow gap", "emission",
     "rounded rectangle of height g: W = A/g + (1 - pi/4) g; Xu, Agassant & Pigeonneau 2022", "|W / W_ref - 1|",
     spacing=NOZZLE / 8, tolerance=0.10, scenarios=scenarios, evaluate=evaluate,
-    causes=dict.fromkeys(("mpm", "sph"), "no plate presses the strand, and a liquid without tension opens voids"),
+    causes=dict.fromkeys(("mpm", "sph"), "not understood; suspected: no nozzle face presses the strand from above"),
     exempt={"pbd": "velocity smoothing cannot reach this viscosity at PBD's time step"},
 )  # fmt: skip

@@ -52,6 +52,8 @@ CASE = Case(
     "bingham_channel", "plug flow of a Bingham paste between plates", "yield stress", "exact; Bingham, validation D",
     "E2 of velocity", spacing=HALF / 16, tolerance=0.05, fine_tolerance=0.03, scenarios=scenarios, evaluate=evaluate,
     quick=HALF / 16,
-    causes={"sph": "plug a fifth too fast with alpha = 1, h = 1.5 d (4 % with 0.3, 1.3 d, which fail column_slump)"},
+    causes={
+        "sph": "slip at the wall, not understood: rows slide past their images, and finer spacings do not cure it",
+    },
     exempt={"pbd": "shear stiffness is limited by the time step"},
 )  # fmt: skip

@@ -7,7 +7,7 @@ from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 from .slump_slip import HEIGHT, column
 
-STRESSES = (0.38, 0.42, 0.46, 0.50, 0.54)  # tau'
+STRESSES = (0.38, 0.42, 0.46, 0.50, 0.54, 0.60)  # tau'
 CRITERION, WANTED = 0.02, 0.466
 
 
@@ -41,5 +41,6 @@ CASE = Case(
     "collapse_threshold", "the yield stress below which a slender column flows", "yield stress",
     "slender theory (von Mises); Roussel 2018, validation D", "|tau'_c / 0.466 - 1| at the criterion s' = 0.02",
     spacing=HEIGHT / 24, tolerance=0.15, fine_tolerance=0.10, scenarios=scenarios, evaluate=evaluate,
+    causes={"sph": "columns that should stand sink by 2 to 4 % as their foot splits into petals, as in slump_slip"},
     exempt={"pbd": "shear stiffness is limited by the time step"},
 )  # fmt: skip

@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from fluidbench.measure.profiles import relative_l2
 from fluidbench.scenario import Scenario
 from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
 
 HEIGHT, SIDE = 0.2, 0.08
-TICKS, ITERATIONS = (4e-3, 2e-3), (4, 8, 16)
+PAIRS = ((8e-3, 32), (8e-3, 16), (4e-3, 16), (4e-3, 8), (4e-3, 4), (2e-3, 4), (2e-3, 2))  # (dt [s], iterations)
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
@@ -19,11 +18,15 @@ def scenarios(spacing: float) -> dict[str, Scenario]:
             numerics={"pbd": {"iterations": iterations, "advance": 1.0}},
         )  # fmt: skip
 
-    return {f"{tick} {n}": tank(tick, n) for tick in TICKS for n in ITERATIONS}
+    return {f"{tick} {n}": tank(tick, n) for tick, n in PAIRS}
 
 
 def evaluate(runs: dict[str, Run]) -> Finding:
-    """Settlement must scale as dt^2 / n, apart from the packing that the lattice finds whatever dt."""
+    """Settlement over that of c_eff = kappa (d / dt) sqrt(n), kappa fitted once; largest departure from it.
+
+    A column of depth H with stiffness rho c^2 sinks on average by g H / (3 c^2), over H / 2: twice that. What
+    the lattice packs whatever dt is taken off.
+    """
     load, sunk = [], []
     for label, run in runs.items():
         n = int(label.split()[1])
@@ -31,23 +34,23 @@ def evaluate(runs: dict[str, Run]) -> Finding:
         load.append(9.81 * run.dt**2 / (n * run.scenario.spacing**2))
         sunk.append(1 - float(np.mean(late)) / (HEIGHT / 2))
     load, sunk = np.array(load), np.array(sunk)
-    slope, packing = np.polyfit(load, sunk, 1)
+    slope, packing = np.polyfit(load, sunk, 1, w=1 / load)  # relative departures count alike
     fitted = slope * load + packing
-    error = relative_l2(sunk - packing, slope * load)
+    departure = np.abs((sunk - packing) / (slope * load) - 1.0)
     numbers = (
         Number("kappa in c_eff = kappa d sqrt(n) / dt", float(np.sqrt(2 * HEIGHT / (3 * slope))), 0.5),
         Number("packing left at dt = 0", float(packing), 0.0),
+        *(Number(f"settlement / H at dt, n = {name}", s, f) for name, s, f in zip(runs, sunk, fitted, strict=True)),
     )
     order = np.argsort(load)
     x, y = load[order], sunk[order]
     curve = Curve("settlement", "g dt^2 / (n d^2) [1/m]", "settlement / H", x, y, x, fitted[order])
-    return Finding(error, numbers, (curve,))
+    return Finding(float(departure.max()), numbers, (curve,))
 
 
 ONLY = "the case measures the numerical stiffness of position-based dynamics"
 CASE = Case(
     "pbd_stiffness", "settlement of a PBD liquid against dt and iterations", "numerics",
-    "scaling dt^2 / n; validation I", "E2 of the settlement, packing taken off", spacing=0.01, tolerance=0.2,
-    scenarios=scenarios, evaluate=evaluate,
-    skipped={"mpm": ONLY, "sph": ONLY},
+    "scaling dt^2 / n; validation I", "largest departure of the settlement from dt^2 / n, packing taken off",
+    spacing=0.01, tolerance=0.2, scenarios=scenarios, evaluate=evaluate, skipped={"mpm": ONLY, "sph": ONLY},
 )  # fmt: skip

@@ -54,6 +54,7 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 CASE = Case(
     "poiseuille_startup", "start-up of flow between no-slip walls", "viscous", "exact; Morris et al. 1997, eq. 21",
     "E2 of velocity, worst of nu t / L^2 = 0.02, 0.1, 0.6", spacing=WIDTH / 20, tolerance=0.03, fine_tolerance=0.02,
-    tolerances={"mpm": 0.05}, scenarios=scenarios, evaluate=evaluate, quick=WIDTH / 20,
+    scenarios=scenarios, evaluate=evaluate, quick=WIDTH / 20,
+    causes={"mpm": "second order, but the channel is only 10 cells across; passes at two thirds of the spacing"},
     exempt={"pbd": "the viscosity of velocity smoothing is calibrated in bulk, not at walls"},
 )  # fmt: skip

@@ -54,6 +54,6 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 CASE = Case(
     "self_weight_column", "a confined elastic column under its own weight", "elastic",
     "exact for the law of solvers/constitutive.py; validation E", "relative error of the top's settlement",
-    spacing=LENGTH / 50, tolerance=0.02, fine_tolerance=0.01, scenarios=scenarios, evaluate=evaluate,
-    exempt={"pbd": "one-sided density constraints are incompressible: no bulk modulus"},
+    spacing=LENGTH / 50, tolerance=0.01, fine_tolerance=0.005, scenarios=scenarios, evaluate=evaluate,
+    exempt={"pbd": "bonds are central forces: the confined modulus is 1.2 E, here it should be 1.35 E"},
 )  # fmt: skip

@@ -26,26 +26,29 @@ def profile(radius: np.ndarray, front: float) -> np.ndarray:
 
 
 def evaluate(runs: dict[str, Run]) -> Finding:
-    """|R - R_ref| / R_ref against the volume-of-fluid computation; the theory's profile beside it."""
+    """|R - R_ref| / R_ref against the volume-of-fluid computation, and the theory's profile apart from the last 2 d."""
     run = runs["deposit"]
     data = table("viscoplastic_slump_crosscheck").set_index("tau_prime").loc[TAU]
     front = run.record["measures"]["spread_radius_m"]
     radius, height = radial_heights(deposit_of(run.frames[-1], run.scenario), 0.0, 0.0)
     inside = radius < data["spread_vof"] * HEIGHT - 2 * run.scenario.spacing
     theory = profile(radius, data["spread_second"] * HEIGHT)
+    shape = relative_l2(height[inside], theory[inside])
     numbers = (
         Number("R / H", front / HEIGHT, float(data["spread_vof"])),
         Number("R / H, second-order theory", front / HEIGHT, float(data["spread_second"])),
         Number("slump", run.record["measures"]["slump"], float(data["slump_vof"])),
-        Number("E2 of the profile against the theory", relative_l2(height[inside], theory[inside]), 0.0),
+        Number("E2 of the profile against the theory", shape, 0.0),
     )
     curve = Curve("profile", "r [m]", "h [m]", radius, height, radius, theory)
-    return Finding(abs(front / HEIGHT / float(data["spread_vof"]) - 1.0), numbers, (curve,))
+    off = abs(front / HEIGHT / float(data["spread_vof"]) - 1.0)
+    return Finding(max(off, 0.8 * shape), numbers, (curve,))
 
 
 CASE = Case(
     "spread_deposit", "final shape of a soft yield-stress deposit", "yield stress",
     "volume-of-fluid computation (viscoplastic_slump_crosscheck.csv); Roussel & Coussot 2005, Dubash et al. 2009",
-    "|R / R_ref - 1| at tau' = 0.05", spacing=HEIGHT / 20, tolerance=0.08, scenarios=scenarios, evaluate=evaluate,
+    "worse of |R / R_ref - 1| and 4/5 of the profile's E2, tau' = 0.05",
+    spacing=HEIGHT / 20, tolerance=0.08, scenarios=scenarios, evaluate=evaluate,
     exempt={"pbd": "shear stiffness is limited by the time step"},
 )  # fmt: skip

@@ -6,8 +6,8 @@ Quadratic B-splines; D = diag(dx^2) / 4, so the inverse inertia tensor is 4 diag
 
 import warp as wp
 
-from fluidbench.particles import CARRIED, FREE
-from fluidbench.scene import Force, Phase, force_at
+from fluidbench.particles import CARRIED, CLAMPED, FREE
+from fluidbench.scene import Force, Phase, force_at, is_solid
 
 from .. import constitutive
 from ..bind import warp_func
@@ -22,6 +22,10 @@ pressure = warp_func(constitutive.pressure)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
+# Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
+# they share: a beam falls slowly off it.
+ANCHOR = wp.constant(1.0e4)
+ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
 
 
 @wp.kernel
@@ -138,6 +142,8 @@ def p2g(
     b = elastic_normal[p]
     s = elastic_shear[p]
     m = mass[p]
+    if held[p] == CLAMPED:
+        m *= ANCHOR
     a = wp.mat33()
     if held[p] == FREE:
         a = m * c
@@ -324,8 +330,9 @@ def g2p(
             else:
                 v = velocity[p]
             j = volume_ratio[p]
-            crowding = j * density / phases[world, phase_of[p]].density - 1.0 - feedback.tolerance
-            if crowding > 0.0:
+            phase = phases[world, phase_of[p]]
+            crowding = j * density / phase.density - 1.0 - feedback.tolerance
+            if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
                 volume_ratio[p] = j * (1.0 - wp.min(dt[world] * feedback.rate * crowding, 0.1))
         free = x + dt[world] * v
         x = contained(grid, free)

@@ -1,20 +1,22 @@
 """Position-based fluids (Macklin & Mueller 2013, ACM TOG 32:104) in Warp.
 
 One substep: predict, lists, then per iteration multipliers and correction, then velocity from the change of position.
-Elastic shear is a compliant constraint (XPBD, Macklin et al. 2016) whose multiplier is bounded by the yield stress: one
-Jacobi step a substep, `strain` and `pull`. Newtonian viscosity is mapped onto velocity smoothing (`smoothing_weight`).
+Shear strength of what flows is a compliant constraint (XPBD, Macklin et al. 2016) whose multiplier is bounded by the
+yield stress: one Jacobi step a substep, `strain` and `pull`. Solids are held by bonds instead (bonds.py). Newtonian
+viscosity is mapped onto velocity smoothing (laws.smoothing_weight).
 """
 
 import warp as wp
 
 from fluidbench.particles import CARRIED
-from fluidbench.scene import FRICTION, NEVER_YIELDS, PERIODIC, Box, Force, Phase, force_at
+from fluidbench.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at, is_solid
 
 from .. import constitutive
 from ..bind import warp_func
-from ..corrected import mirrored_stress, symmetric_inverse
+from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky, spiky_slope
+from . import laws
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -22,10 +24,13 @@ kernel = warp_func(poly6)
 summed = warp_func(spiky)
 gradient = warp_func(spiky_slope)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
+smoothing_weight = warp_func(laws.smoothing_weight)
+conveyed_modulus = warp_func(laws.conveyed_modulus)
 
-
-FOLLOW = wp.constant(0.02)  # share of the gap between integrated and summed volume that a substep closes
-LEAN = wp.constant(0.5)  # how far the neighbourhood may lean to one side, over the support, and count as complete
+SLACK = wp.constant(
+    2.0e-3
+)  # density that is left alone, over that at rest: what the lattices of round bodies are off by
+SLACK_SOLID = wp.constant(0.1)  # a solid's bonds keep its density; the constraint only keeps its parts apart
 
 
 @wp.struct
@@ -38,7 +43,7 @@ class Numbers:
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
     sweeps: int  # shear sweeps per substep
-    calm: float  # share of the approach of neighbours that is damped in a substep, with shear stiffness [-]
+    calm: float  # share of the approach of neighbours that is damped in a substep, in pastes [-]
     stiffness: float  # largest shear modulus that one Jacobi step conveys, over rho (d / dt)^2 [-]
 
 
@@ -76,8 +81,8 @@ def predict(
 
 @wp.kernel
 def multipliers(
-    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float),
+    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float),
     # outputs
     multiplier: wp.array(dtype=float), fill: wp.array(dtype=float),
 ):  # fmt: skip
@@ -87,9 +92,12 @@ def multipliers(
     sums with poly6, whose flat top lets particles pair.
     """
     i = wp.tid()
-    if i % capacity < count[i / capacity]:
+    world = i / capacity
+    if i - world * capacity < count[world]:
         x = position[i]
-        dense = volume[i] * summed(0.0, num.support)
+        # Its own term counts the particle's volume by half: a lattice stretched by a percent then sums as before.
+        lattice = num.spacing * num.spacing * num.spacing
+        dense = 0.5 * (volume[i] + lattice) * summed(0.0, num.support)
         own = wp.vec3(0.0, 0.0, 0.0)
         squares = float(0.0)
         for k in range(lists.number[i]):
@@ -110,7 +118,10 @@ def multipliers(
         fill[i] = dense
         # One-sided: a surface must not be pulled together. Lengths are scaled by the spacing to make epsilon a number.
         scale = num.spacing * num.spacing
-        multiplier[i] = -wp.max(dense - 1.0, 0.0) / ((squares + wp.dot(own, own)) * scale + num.relaxation)
+        limit = 1.0 + SLACK
+        if is_solid(phases[world, phase_of[i]]):
+            limit = 1.0 + SLACK_SOLID
+        multiplier[i] = -wp.max(dense - limit, 0.0) / ((squares + wp.dot(own, own)) * scale + num.relaxation)
 
 
 @wp.kernel
@@ -174,39 +185,25 @@ def velocities(
         velocity[i] = motion[i] / dt[world]
 
 
-@wp.func
-def conveyed_modulus(num: Numbers, modulus: float, density: float, dt: float):
-    """Modulus that acts at this dt [Pa]: 1 / M_eff = 1 / M + dt^2 / (stiffness rho d^2).
-
-    The XPBD multiplier -C / (S + 1 / (G dt^2)) of a strain constraint C with inverse mass S is that of an elastic
-    stress with this modulus: beyond what dt allows a stiffer material does not get stiffer.
-    """
-    most = num.stiffness * density * num.spacing * num.spacing / (dt * dt)
-    return modulus * most / (modulus + most)
-
-
 @wp.kernel
 def strain(
     num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
     phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float), velocity: wp.array(dtype=wp.vec3),
-    fill: wp.array(dtype=float),
     # outputs
-    swelling: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+    elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
     stress: wp.array(dtype=wp.mat33),
 ):  # fmt: skip
-    """Strain of the substep by the common material law, and the stress that answers it: the elastic deviator, and
-    in a solid tension where it has swelled; density constraints only push. What yields flows, which lets pushes without
-    pulls pass for swelling: it carries no isotropic tension."""
+    """Strain of the substep by the common material law, and the elastic deviator that answers it. There is no isotropic
+    tension: density constraints only push."""
     i = wp.tid()
     world = i / capacity
-    if i - world * capacity < count[world]:
-        phase = phases[world, phase_of[i]]
+    phase = phases[world, phase_of[i]]
+    if i - world * capacity < count[world] and not is_solid(phase):
         x = position[i]
         v = velocity[i]
         slope = wp.mat33()
         moment = wp.mat33()
-        lean = wp.vec3(0.0, 0.0, 0.0)
         for k in range(lists.number[i]):
             entry = lists.entries[i * lists.row + k * lists.column]
             j = entry & INDEX_MASK
@@ -221,18 +218,9 @@ def strain(
             g = volume[j] * gradient(distance, num.support) / wp.max(distance, 1.0e-9)
             slope -= wp.outer(g * (v - vj), r)
             moment -= wp.outer(g * r, r)
-            lean += g * r
         correction = symmetric_inverse(moment)
         slope = slope * correction
-        modulus = conveyed_modulus(num, phase.shear_modulus, phase.density, dt[world])
-        # The volume that is integrated follows the one that particles really fill, where neighbours surround it.
-        whole = wp.max(1.0 - wp.length(lean) * num.support / LEAN, 0.0)
-        volume_strain = swelling[i] + dt[world] * wp.trace(slope)
-        volume_strain += FOLLOW * whole * (-wp.log(wp.max(fill[i], 0.1)) - volume_strain)
-        swelling[i] = volume_strain
-        tension = float(0.0)
-        if phase.yield_stress >= NEVER_YIELDS and phase.relaxation_rate == 0.0:
-            tension = conveyed_modulus(num, phase.bulk_modulus, phase.density, dt[world]) * wp.max(volume_strain, 0.0)
+        modulus = conveyed_modulus(phase.shear_modulus, num.stiffness, phase.density, num.spacing, dt[world])
         b = elastic_normal[i]
         s = elastic_shear[i]
         if held[i] != CARRIED:
@@ -246,10 +234,7 @@ def strain(
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[i] = b
             elastic_shear[i] = s
-        mean = (b[0] + b[1] + b[2]) / 3.0
-        mean -= tension / modulus
-        strength = wp.mat33(b[0] - mean, s[0], s[1], s[0], b[1] - mean, s[2], s[1], s[2], b[2] - mean)
-        stress[i] = (modulus / phase.density) * (strength * correction)
+        stress[i] = (1.0 / phase.density) * (elastic_stress(modulus, b, s, 0.0) * correction)
 
 
 @wp.kernel
@@ -291,14 +276,6 @@ def pull(
         smoothed[i] = v
 
 
-@wp.func
-def smoothing_weight(num: Numbers, phase: Phase, dt: float):
-    """XSPH coefficient of one sweep that acts like the material's viscosity: c = 22 nu dt / (sweeps H^2), at most 1
-    (validation C)."""
-    c = 22.0 * phase.viscosity / phase.density * dt / (num.support * num.support * float(num.sweeps))
-    return wp.min(c, 1.0)
-
-
 @wp.kernel
 def shear(
     num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
@@ -331,35 +308,46 @@ def shear(
             total += w
         out = v
         if held[i] == 0:
-            c = smoothing_weight(num, phase, dt[world])
+            c = smoothing_weight(phase.viscosity, phase.density, dt[world], num.support, float(num.sweeps))
             out = v + (c / wp.max(total, 1.0)) * mean
         smoothed[i] = out
+
+
+@wp.func
+def rubbing(kind: int, gap: float, spacing: float, solid: bool):
+    """Whether a particle this far from a face rubs on it: stick walls hold the viscous by its images, solids here."""
+    return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
 
 
 @wp.kernel
 def rub(
     box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
-    spacing: float, force: wp.array(dtype=Force), position: wp.array(dtype=wp.vec3),
+    spacing: float, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
+    position: wp.array(dtype=wp.vec3),
     # outputs
     velocity: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
-    """Particles touching a friction wall lose tangential speed by Coulomb's law."""
+    """Particles touching a friction wall lose tangential speed by Coulomb's law; solids on a stick wall all of it."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == 0:
         v = velocity[i]
+        x = position[i]
+        solid = is_solid(phases[world, phase_of[i]])
         for axis in range(3):
-            lower = box.lower_kind[axis] == FRICTION and position[i][axis] - box.lower[axis] < spacing
-            upper = box.upper_kind[axis] == FRICTION and box.upper[axis] - position[i][axis] < spacing
-            if lower or upper:
-                friction = box.lower_friction[axis]
-                if upper:
-                    friction = box.upper_friction[axis]
+            kind, friction = box.lower_kind[axis], box.lower_friction[axis]
+            touching = rubbing(kind, x[axis] - box.lower[axis], spacing, solid)
+            if rubbing(box.upper_kind[axis], box.upper[axis] - x[axis], spacing, solid):
+                kind, friction = box.upper_kind[axis], box.upper_friction[axis]
+                touching = True
+            if touching:
                 normal = v[axis]
                 slide = v
                 slide[axis] = 0.0
                 speed = wp.length(slide)
-                grip = wp.min(friction * wp.abs(force_at(force[world], position[i])[axis]) * dt[world], speed)
+                grip = speed
+                if kind == FRICTION:
+                    grip = wp.min(friction * wp.abs(force_at(force[world], x)[axis]) * dt[world], speed)
                 v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
                 v[axis] = normal
         velocity[i] = v

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from fluidbench.particles import Pool
 from fluidbench.scenario import Scenario
-from fluidbench.scene import FRICTION, Scene
+from fluidbench.scene import FRICTION, STICK, Scene
 from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound
 
@@ -16,6 +16,7 @@ from .. import neighbours
 from ..neighbours import FAULT_NEIGHBOURS, Neighbours
 from ..order import CellOrder
 from ..smoothing import spiky
+from . import bonds, laws
 from . import kernels_warp as kernels
 
 
@@ -29,7 +30,8 @@ class ConfigPBD(Config):
     shear_stiffness: Annotated[float, Field(gt=0, le=2)] = Field(
         0.5, description="largest shear modulus that a substep conveys, over rho (d / dt)^2"
     )
-    calm: Annotated[float, Field(ge=0, le=1)] = Field(0.05, description="damping along lines of centres, in solids")
+    calm: Annotated[float, Field(ge=0, le=1)] = Field(0.05, description="damping along lines of centres, in pastes")
+    bond_sweeps: Annotated[int, Field(ge=1, le=500)] = Field(20, description="Jacobi sweeps over the bonds of solids")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
 
@@ -39,15 +41,24 @@ def largest_viscosity(scenario: Scenario, config: ConfigPBD, dt: float) -> float
     return scenario.material.density * config.shear_sweeps * support**2 / (22.0 * dt)
 
 
+STIFFEST = 0.5  # kappa in c_eff = kappa (d / dt) sqrt(sweeps), Jacobi (validation I)
+
+
 class SolverPBD(Solver):
-    """Position-based fluids: one-sided density constraints, compliant shear bounded by yield, XSPH for viscosity."""
+    """Position-based fluids: one-sided density constraints, compliant shear bounded by yield, bonds, XSPH viscosity."""
 
     name = "pbd"
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
     features = frozenset(Feature) - {Feature.PRESSURE}
     Config: ClassVar = ConfigPBD
-    faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
-    passes = ("predict", "lists", "multipliers", "correct", "apply", "velocities", "strain", "pull", "shear", "rub")
+    faults: ClassVar = {
+        FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full",
+        bonds.FAULT_BONDS: "a particle of a solid has more than 48 neighbours to bond with; make the bodies less dense",
+    }
+    passes = (
+        "predict", "lists", "bind", "stretch", "multipliers", "correct", "apply", "velocities", "strain", "pull",
+        "shear", "rub",
+    )  # fmt: skip
 
     typical_rate, typical_bytes = 1.2e5, 900.0
 
@@ -59,13 +70,18 @@ class SolverPBD(Solver):
         most = largest_viscosity(scenario, config, dt)
         if m.viscosity > most:
             words.append(f"viscosity {m.viscosity:g} Pa s acts like at most {most:.3g} Pa s (XSPH at this dt)")
-        stiffest = config.shear_stiffness * m.density * (scenario.spacing / dt) ** 2
-        if m.shear_modulus > 0.1 * stiffest:
-            words.append(
-                f"shear modulus {m.shear_modulus:.3g} Pa acts like {1 / (1 / m.shear_modulus + 1 / stiffest):.3g} Pa: "
-                "one compliant constraint a substep conveys no more"
-            )
-        if m.yield_stress is not None or m.relaxation_time is not None:
+        if m.is_solid:
+            words.append("Poisson ratio 1/4: bonds are central forces")
+            stiffest = STIFFEST**2 * config.bond_sweeps * m.density * (scenario.spacing / dt) ** 2
+            if m.youngs_modulus is not None and m.youngs_modulus > 0.1 * stiffest:
+                words.append(f"Young's modulus beyond {stiffest:.3g} Pa acts like that: sweeps convey no more")
+        elif m.youngs_modulus is not None:
+            acts = laws.conveyed_modulus(m.shear_modulus, config.shear_stiffness, m.density, scenario.spacing, dt)
+            if acts < 0.9 * m.shear_modulus:
+                words.append(
+                    f"shear modulus {m.shear_modulus:.3g} Pa acts like {acts:.3g} Pa: one compliant constraint "
+                    "a substep conveys no more"
+                )
             words.append("no isotropic tension: density constraints only push")
         return [*words, "pressure is whatever keeps rho <= rho0: no equation of state, no sound speed"]
 
@@ -86,20 +102,21 @@ class SolverPBD(Solver):
         self.num.weight = 1.0 / _lattice_sum(config.support_ratio)
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
         self.num.sweeps = config.shear_sweeps
-        self.rubs = any(kind == FRICTION for kind in (*scene.box.lower_kind, *scene.box.upper_kind))
+        kinds = (*scene.box.lower_kind, *scene.box.upper_kind)
+        self.rubs = FRICTION in kinds or (scene.solid and STICK in kinds)
         self.num.calm = config.calm
         self.num.stiffness = config.shear_stiffness
-        if scene.elastic:
+        if scene.flowing:
             pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
             pool.add_field("elastic_shear", wp.vec3)
-            pool.add_field("swelling", float)
+        self.network = bonds.Network(scene, pool) if scene.solid else None
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)
             self.smoothed = wp.zeros(pool.size, dtype=wp.vec3)
             self.multiplier = wp.zeros(pool.size, dtype=float)
             self.fill = wp.ones(pool.size, dtype=float)
-            self.stress = wp.zeros(pool.size if scene.elastic else 1, dtype=wp.mat33)
+            self.stress = wp.zeros(pool.size if scene.flowing else 1, dtype=wp.mat33)
         self.neighbours = Neighbours(scene, pool, self.num.support, config.skin * scene.spacing)
         self.pairs = self.neighbours.lists
         self.order = CellOrder(scene, pool, self.num.support)
@@ -110,12 +127,17 @@ class SolverPBD(Solver):
     def substep(self) -> None:
         self.predict()
         self.lists()
+        if self.network is not None:
+            self.bind()
+            for sweep in range(self.config.bond_sweeps):
+                self.stretch(sweep)
+                self.apply()
         for _ in range(self.config.iterations):
             self.multipliers()
             self.correct()
             self.apply()
         self.velocities()
-        if self.scene.elastic:
+        if self.scene.flowing:
             self.strain()
             self.pull()
         if self.scene.viscous:
@@ -141,11 +163,19 @@ class SolverPBD(Solver):
     def lists(self) -> None:
         self.neighbours.update()
 
+    def bind(self) -> None:
+        assert self.network is not None
+        self.network.bind(self.pairs)
+
+    def stretch(self, sweep: int = 0) -> None:
+        assert self.network is not None
+        self.network.stretch(sweep, self.correction)
+
     def multipliers(self) -> None:
-        pool = self.pool
+        pool, scene = self.pool, self.scene
         self._launch(
             kernels.multipliers,
-            [self.num, self.scene.box, self.pairs, *self._active(), pool.position, pool.volume],
+            [self.num, scene.box, self.pairs, *self._active(), scene.phases, pool.phase, pool.position, pool.volume],
             [self.multiplier, self.fill],
         )
 
@@ -179,8 +209,8 @@ class SolverPBD(Solver):
         self._launch(
             kernels.strain,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
-             pool.position, pool.volume, pool.velocity, self.fill],
-            [pool.swelling, pool.elastic_normal, pool.elastic_shear, self.stress],
+             pool.position, pool.volume, pool.velocity],
+            [pool.elastic_normal, pool.elastic_shear, self.stress],
         )  # fmt: skip
 
     def pull(self) -> None:
@@ -207,16 +237,17 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         self._launch(
             kernels.rub,
-            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.force, pool.position],
+            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.phases, pool.phase, scene.force,
+             pool.position],
             [pool.velocity],
-        )
+        )  # fmt: skip
 
     def prepare(self) -> None:
-        for module in (kernels, neighbours):
+        for module in (kernels, neighbours, *([bonds] if self.network else [])):
             wp.load_module(module, device=self.scene.device)
 
     def sort_keys(self) -> Any:
-        return self.order.keys()
+        return self.order.keys() if self.network is None else None  # bonds name their partners by slot
 
     def densities(self) -> np.ndarray:
         rest = np.array([s.material.density for s in self.scene.scenarios]).repeat(self.pool.capacity)
@@ -224,7 +255,8 @@ class SolverPBD(Solver):
 
     def footprint(self) -> dict[str, int]:
         own = ("motion", "correction", "smoothed", "multiplier", "fill", "stress")
-        return {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
+        bytes_of = {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
+        return bytes_of | (self.network.footprint() if self.network else {})
 
 
 def _lattice_sum(support_ratio: float) -> float:

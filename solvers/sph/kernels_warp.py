@@ -11,11 +11,11 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.particles import CARRIED
-from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at
+from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid
 
 from .. import constitutive
 from ..bind import warp_func
-from ..corrected import mirrored_stress, symmetric_inverse
+from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import (
     INDEX_BITS,
     INDEX_MASK,
@@ -25,6 +25,7 @@ from ..neighbours import (
     face_kind,
     image_gradient,
     image_position,
+    image_rate,
     image_velocity,
 )
 from ..smoothing import wendland, wendland_slope
@@ -49,6 +50,7 @@ class Smoothing:
     density_diffusion: float  # delta [-]
     artificial_viscosity: float  # alpha [-]
     artificial_stress: float  # epsilon [-]
+    density_tolerance: float  # gap between the two that is left alone, over the density [-]
     density_feedback: float  # rate at which the integrated density follows the summed one, in c / h [-]
 
 
@@ -69,6 +71,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
         # outputs
         elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
         new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
+        rate: wp.array(dtype=wp.mat33),
     ):  # fmt: skip
         """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
@@ -87,6 +90,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             spread = float(0.0)
             gradient = wp.mat33()
             moment = wp.mat33()
+            second = float(0.0)
             lean = wp.vec3(0.0, 0.0, 0.0)
             start = i * lists.row
             for k in range(lists.number[i]):
@@ -106,25 +110,34 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 if code > 0:
                     lifts = image_gradient(box, lifts, code)
                 spread += w * (rho - density[j] - wp.dot(own_lift + lifts, r))
+                second -= w * wp.dot(r, r)
+                lean += w * r
                 if wp.static(strength):
                     gradient -= wp.outer(w * u, r)
                     moment -= wp.outer(w * r, r)
-                    lean += w * r
             if wp.static(strength):
                 # density from the corrected gradient, too: the same strain for pressure and for shear
                 correction = symmetric_inverse(moment / rho)
                 gradient = gradient * correction / rho
+                rate[i] = gradient
                 inflow = -rho * wp.trace(gradient)
-                # The density that particles really have, against the one they integrate, which drifts: applied
-                # where the neighbourhood is complete (it leans to no side), or too crowded for any.
-                drift = wp.trace(moment) * num.lattice / 3.0 - rho
-                whole = wp.max(1.0 - wp.length(lean) * num.h / (WHOLE * rho), 0.0)
-                if drift > 0.0:
-                    whole = 1.0
-                inflow += num.density_feedback * num.sound_speed / num.h * whole * drift
+            # The density that particles really have, against the one they integrate, which drifts: applied where the
+            # neighbourhood is complete (it leans to no side), or too crowded for any.
+            drift = second * num.lattice / 3.0 - rho
+            whole = wp.max(1.0 - wp.length(lean) * num.h / (WHOLE * rho), 0.0)
+            if drift > 0.0:
+                whole = 1.0
+            drift = wp.sign(drift) * wp.max(wp.abs(drift) - num.density_tolerance * rho, 0.0)
+            if phase.relaxation_rate > 0.0:
+                # in a stretched thread a pair too close reads as thin, and would be pulled closer
+                drift = wp.max(drift, wp.min(phase.density - rho, 0.0))
+            if is_solid(phase):
+                drift = 0.0  # density is its strain: nothing may level it
+                spread = 0.0
+            inflow += num.density_feedback * num.sound_speed / num.h * whole * drift
             h = dt[world]
-            rate = inflow + 2.0 * num.density_diffusion * num.h * num.sound_speed * spread / rho
-            rho = wp.max(rho + h * rate, FLOOR * phase.density)
+            growth = inflow + 2.0 * num.density_diffusion * num.h * num.sound_speed * spread / rho
+            rho = wp.max(rho + h * growth, FLOOR * phase.density)
             new_density[i] = rho
             p = pressure(rho / phase.density - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
             scale = 1.0 / (rho * rho)
@@ -137,19 +150,15 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                         gradient[1, 2], gradient[2, 0], gradient[2, 1], gradient[2, 2],
                         b[0], b[1], b[2], s[0], s[1], s[2],
                         phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
-                phase.relaxation_rate, h,
+                        phase.relaxation_rate, h,
                     )  # fmt: skip
                     b = wp.vec3(b_xx, b_yy, b_zz)
                     s = wp.vec3(b_xy, b_xz, b_yz)
                     elastic_normal[i] = b
                     elastic_shear[i] = s
                 g = phase.shear_modulus * rho / phase.density  # Cauchy from Kirchhoff: divide by J
-                mean = (b[0] + b[1] + b[2]) / 3.0
-                mean += p / g
                 # With the correction of its gradient stress does on the particles exactly the work of the strain.
-                stress[i] = (scale * g) * (
-                    wp.mat33(b[0] - mean, s[0], s[1], s[0], b[1] - mean, s[2], s[1], s[2], b[2] - mean) * correction
-                )
+                stress[i] = scale * (elastic_stress(g, b, s, p) * correction)
             else:
                 load[i] = scale * p
 
@@ -158,6 +167,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
         phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
         position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
         density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
+        rate: wp.array(dtype=wp.mat33),
         # outputs
         acceleration: wp.array(dtype=wp.vec3),
     ):  # fmt: skip
@@ -169,13 +179,14 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             v = velocity[i]
             rho = density[i]
             own = load[i]
-            own_stress = wp.mat33()
+            own_stress, own_rate = wp.mat33(), wp.mat33()
             if wp.static(strength):
                 own_stress = stress[i]
+                own_rate = rate[i]
             inv_h = 1.0 / num.h
             tiny = 0.01 * num.h * num.h
             shock = num.artificial_viscosity * num.h * num.sound_speed / rho
-            friction = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
+            drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
             inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
             pull = force_at(force[world], x)
             a = wp.vec3(0.0, 0.0, 0.0)
@@ -196,12 +207,21 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 q = wp.sqrt(r2) * inv_h
                 f = mass[j] * slope(q, num.h)
                 ur = wp.dot(u, r)
-                # artificial viscosity, for approaching particles (Monaghan 1992)
-                scalar = shock * wp.min(ur, 0.0) / (r2 + tiny)
+                scalar = float(0.0)
+                if wp.static(strength):
+                    # artificial viscosity on what the velocity gradients of both do not explain, such as rows that slip
+                    # past each other: a smooth flow feels none (Frontiere, Raskin & Owen 2017)
+                    flow = rate[j]
+                    if code > 0:
+                        flow = image_rate(box, flow, code)
+                    scalar = shock * (ur - 0.5 * wp.dot(r, (own_rate + flow) * r)) / (r2 + tiny)
+                else:
+                    # for approaching particles (Monaghan 1992)
+                    scalar = shock * wp.min(ur, 0.0) / (r2 + tiny)
                 if wp.static(viscous):
                     # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j), at rest density: a cavitated liquid, whose
                     # density is low, would break the bound on dt
-                    scalar += friction * ur / (r2 + 0.01 * tiny)
+                    scalar += drag * ur / (r2 + 0.01 * tiny)
                 push = wp.vec3(0.0, 0.0, 0.0)
                 if wp.static(strength):
                     other = stress[j]

@@ -36,8 +36,9 @@ class ConfigSPH(Config):
     artificial_viscosity_viscoelastic: NonNegative = Field(0.3, description="alpha for liquids that relax")
     artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
     density_feedback: NonNegative = Field(
-        0.02, description="rate, in c / h, at which integrated density follows the summed one (with shear stiffness)"
+        0.05, description="rate, in c / h, at which integrated density follows the summed one, except in solids"
     )
+    density_tolerance: NonNegative = Field(0.03, description="gap between the two that is left alone, over the density")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
 
     def alpha(self, material: Material) -> float:
@@ -57,7 +58,7 @@ class SolverSPH(Solver):
     features = frozenset(Feature)
     Config: ClassVar = ConfigSPH
     passes = ("lists", "strain", "force", "move")
-    OWN: ClassVar = ("new_density", "load", "stress", "acceleration")
+    OWN: ClassVar = ("new_density", "load", "stress", "rate", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
@@ -100,6 +101,7 @@ class SolverSPH(Solver):
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.artificial_stress = config.artificial_stress
         self.num.density_feedback = config.density_feedback
+        self.num.density_tolerance = config.density_tolerance
         pool.add_field("density", float, scene.scenario.material.density)
         pool.add_field("lift", wp.vec3)
         self._rest_densities()
@@ -112,6 +114,7 @@ class SolverSPH(Solver):
             self.new_density = wp.zeros(pool.size, dtype=float)
             self.load = wp.zeros(pool.size, dtype=float)
             self.stress = wp.zeros(solid, dtype=wp.mat33)
+            self.rate = wp.zeros(solid, dtype=wp.mat33)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
         self.neighbours = Neighbours(scene, pool, 2.0 * self.num.h, config.skin * self.num.h)
         self.pairs = self.neighbours.lists
@@ -143,7 +146,7 @@ class SolverSPH(Solver):
             self.kernels.strain,
             pool.size,
             [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.density, pool.lift],
-            [*elastic, self.new_density, self.load, self.stress],
+            [*elastic, self.new_density, self.load, self.stress, self.rate],
             device=self.scene.device,
         )
 
@@ -153,7 +156,7 @@ class SolverSPH(Solver):
             self.kernels.force,
             pool.size,
             [*self._common(), self.scene.force, pool.position, pool.velocity, pool.mass, self.new_density, self.load,
-             self.stress],
+             self.stress, self.rate],
             [self.acceleration],
             device=self.scene.device,
         )  # fmt: skip

@@ -38,8 +38,8 @@ def disc_momentum(sim) -> float:
     return (m * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])).sum() + frame["spin"][:, 2].astype(float).sum()
 
 
-@pytest.mark.parametrize(("name", "loss"), [("mpm", 1e-3), ("sph", 1e-3), ("pbd", 5e-3)])
-def test_rigid_rotation_keeps_angular_momentum(name, loss):
+@pytest.mark.parametrize("name", ["mpm", "sph"])
+def test_rigid_rotation_keeps_angular_momentum(name):
     """An elastic disc, four particles thick, spins half a turn: APIC and corrected gradients lose nothing but
     round-off (validation A)."""
     omega = 10.0
@@ -59,7 +59,7 @@ def test_rigid_rotation_keeps_angular_momentum(name, loss):
         sim.look()
         started = disc_momentum(sim) if started is None else started
     assert started == pytest.approx(0.5 * 1000.0 * disc.volume * disc.radius**2 * omega, rel=0.1)  # coarse lattice
-    assert abs(disc_momentum(sim) / started - 1) < loss
+    assert abs(disc_momentum(sim) / started - 1) < 1e-3
 
 
 @pytest.mark.parametrize("viscosity", [1e-3, 1.0, 1e3])

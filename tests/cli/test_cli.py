@@ -96,15 +96,15 @@ def test_list_show_and_doctor_answer():
 
 
 def test_validate_writes_its_table_and_page_and_resumes(tmp_path):
-    command = ["validate", "constitutive_driver", "poiseuille_startup", "--solvers", "mpm", "--out", str(tmp_path)]
+    command = ["validate", "constitutive_driver", "elliptic_drop", "--solvers", "mpm", "--out", str(tmp_path)]
     done = fluidbench(*command)
     assert done.returncode == 0, done.stdout + done.stderr
     table = pd.read_parquet(tmp_path / "validate.parquet")
-    assert list(table["case"]) == ["constitutive_driver", "poiseuille_startup"]
+    assert list(table["case"]) == ["constitutive_driver", "elliptic_drop"]
     assert (table["verdict"] == "pass").all() and (table["error"] > 0).all()
     rows = json.loads((tmp_path / "validate.json").read_text())
-    assert rows[0]["numbers"] and (tmp_path / rows[1]["runs"]["channel"] / "record.json").is_file()
-    assert "| poiseuille_startup | viscous | mpm |" in (tmp_path / "validate.md").read_text()
+    assert rows[0]["numbers"] and (tmp_path / rows[1]["runs"]["drop"] / "record.json").is_file()
+    assert "| elliptic_drop | liquid | mpm |" in (tmp_path / "validate.md").read_text()
     page = (tmp_path / "report.html").read_text()
     assert "Known answers" in page and 'src="http' not in page
     records = {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}

@@ -1,0 +1,203 @@
+"""Bonds that hold solids together in PBD: XPBD distance constraints (Macklin, Mueller & Chentanez 2016, MIG).
+
+A particle bonds once, when it is first free to move, to the free particles around it, and for ever: lengths are taken
+from that moment, in which bonds carry no stress. Central forces fix the Poisson ratio at 1/4 (see laws.bond_stiffness).
+Entry k of particle i is at k * slots + i; mirror images in slip walls are bonded too, since such walls hold.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from fluidbench.particles import CARRIED, CLAMPED, FREE, Pool
+from fluidbench.scene import PERIODIC, SLIP, STICK, Box, Phase, Scene, is_solid
+
+from ..bind import warp_func
+from ..neighbours import INDEX_BITS, INDEX_MASK, Lists, face_kind, image_code, image_position
+from . import laws
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+bond_stiffness = warp_func(laws.bond_stiffness)
+
+REACH = wp.constant(1.9)  # longest bond, over the spacing: the 26 nearest of a lattice
+ROOM = wp.constant(48)  # bonds of a particle, at most
+ANCHORED = wp.constant(0.75)  # what bonds closer than this to a stick wall is part of it, over the spacing
+DAMPED = wp.constant(
+    0.115
+)  # share of a Jacobi step: 26 / 3 bonds pull each way, so that 3 / 26 is stable for all modes
+FAULT_BONDS = 8
+LOOSE, FRESH, BOUND = wp.constant(0), wp.constant(1), wp.constant(2)
+
+
+@wp.struct
+class Bonds:
+    number: wp.array(dtype=int)
+    partner: wp.array(dtype=int)  # slot in the low bits, mirror image code above, as in neighbour lists
+    rest: wp.array(dtype=float)  # [m]
+    multiplier: wp.array(dtype=float)  # of the present substep
+    state: wp.array(dtype=int)
+
+
+@wp.func
+def nearest_image(box: Box, r: wp.vec3):
+    """A distance by the shortest way round periodic axes."""
+    out = r
+    for axis in range(3):
+        if box.lower_kind[axis] == PERIODIC:
+            length = box.upper[axis] - box.lower[axis]
+            out[axis] = r[axis] - length * wp.round(r[axis] / length)
+    return out
+
+
+@wp.func
+def mirrors_only(box: Box, code: int):
+    """The code without its periodic shifts, which change when a particle wraps; -1 where a wall does not hold."""
+    out = int(0)
+    place = int(1)
+    for axis in range(3):
+        kind = face_kind(box, code, axis)
+        if kind == SLIP and out >= 0:
+            out += place * image_code(code, axis)
+        elif kind != PERIODIC:
+            out = -1
+        place *= 3
+    return out
+
+
+@wp.kernel
+def awaken(
+    box: Box, spacing: float, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), bonds: Bonds,
+    # outputs
+    held: wp.array(dtype=int), velocity: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """Particles that have just come free may bond in this substep; those on a stick wall become part of it."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and is_solid(phases[world, phase_of[i]]):
+        state = bonds.state[i]
+        if state == FRESH:
+            bonds.state[i] = BOUND
+        elif state == LOOSE and held[i] != CARRIED:
+            bonds.state[i] = FRESH
+            for axis in range(3):
+                low = box.lower_kind[axis] == STICK and position[i][axis] - box.lower[axis] < ANCHORED * spacing
+                high = box.upper_kind[axis] == STICK and box.upper[axis] - position[i][axis] < ANCHORED * spacing
+                if (low or high) and held[i] == FREE:
+                    held[i] = CLAMPED
+                    velocity[i] = wp.vec3(0.0, 0.0, 0.0)
+
+
+@wp.func
+def add_bond(bonds: Bonds, i: int, partner: int, rest: float, fault: wp.array(dtype=int)):
+    k = wp.atomic_add(bonds.number, i, 1)
+    if k < ROOM:
+        bonds.partner[k * bonds.number.shape[0] + i] = partner
+        bonds.rest[k * bonds.number.shape[0] + i] = rest
+    else:
+        wp.atomic_add(bonds.number, i, -1)
+        wp.atomic_or(fault, 0, FAULT_BONDS)
+
+
+@wp.kernel
+def bind(
+    box: Box, spacing: float, lists: Lists, capacity: int, count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3), bonds: Bonds,
+    # outputs
+    fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Bond fresh particles to all that are free around them; an older partner is told."""
+    i = wp.tid()
+    if i % capacity < count[i / capacity] and bonds.state[i] == FRESH:
+        for k in range(lists.number[i]):
+            entry = lists.entries[i * lists.row + k * lists.column]
+            j = entry & INDEX_MASK
+            code = mirrors_only(box, entry >> INDEX_BITS)
+            if bonds.state[j] != LOOSE and code >= 0:
+                rest = wp.length(nearest_image(box, position[i] - image_position(box, position[j], code)))
+                if rest < REACH * spacing:
+                    add_bond(bonds, i, j | (code << INDEX_BITS), rest, fault)
+                    if bonds.state[j] == BOUND:
+                        add_bond(bonds, j, i | (code << INDEX_BITS), rest, fault)
+
+
+@wp.kernel
+def stretch(
+    box: Box, spacing: float, sweep: int, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), bonds: Bonds,
+    # outputs
+    correction: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """One damped Jacobi sweep over all bonds (eq. 18 of the paper); both ends of a bond compute the same multiplier."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        shift = wp.vec3(0.0, 0.0, 0.0)
+        phase = phases[world, phase_of[i]]
+        # E = 9 K G / (3 K + G)
+        youngs = 9.0 * phase.shear_modulus / (3.0 + phase.shear_modulus / phase.bulk_modulus)
+        h = dt[world]
+        own = float(0.0)
+        if held[i] == FREE:
+            own = 1.0 / mass[i]
+        x = position[i]
+        slots = bonds.number.shape[0]
+        for k in range(bonds.number[i]):
+            at = k * slots + i
+            entry = bonds.partner[at]
+            j = entry & INDEX_MASK
+            other = float(0.0)
+            if held[j] == FREE:
+                other = 1.0 / mass[j]
+            r = nearest_image(box, x - image_position(box, position[j], entry >> INDEX_BITS))
+            length = wp.length(r)
+            rest = bonds.rest[at]
+            compliance = 1.0 / (bond_stiffness(youngs, spacing, rest) * h * h)
+            before = float(0.0)
+            if sweep > 0:
+                before = bonds.multiplier[at]
+            step = -DAMPED * (length - rest + compliance * before) / (own + other + compliance)
+            bonds.multiplier[at] = before + step
+            shift += (own * step / wp.max(length, 1.0e-9)) * r
+        correction[i] = shift
+
+
+class Network:
+    """The bonds of a pool: what is allocated for them and the passes that use them."""
+
+    def __init__(self, scene: Scene, pool: Pool) -> None:
+        self.scene, self.pool = scene, pool
+        self.bonds = Bonds()
+        with wp.ScopedDevice(scene.device):
+            self.bonds.number = wp.zeros(pool.size, dtype=int)
+            self.bonds.partner = wp.zeros(pool.size * ROOM, dtype=int)
+            self.bonds.rest = wp.zeros(pool.size * ROOM, dtype=float)
+            self.bonds.multiplier = wp.zeros(pool.size * ROOM, dtype=float)
+            self.bonds.state = wp.zeros(pool.size, dtype=int)
+
+    def bind(self, lists: Any) -> None:
+        pool, scene = self.pool, self.scene
+        common = [scene.box, scene.spacing]
+        wp.launch(
+            awaken, pool.size,
+            [*common, pool.capacity, pool.count, scene.phases, pool.phase, pool.position, self.bonds],
+            [pool.held, pool.velocity], device=scene.device,
+        )  # fmt: skip
+        wp.launch(
+            bind, pool.size, [*common, lists, pool.capacity, pool.count, pool.position, self.bonds], [pool.fault],
+            device=scene.device,
+        )  # fmt: skip
+
+    def stretch(self, sweep: int, correction: wp.array) -> None:
+        pool, scene = self.pool, self.scene
+        wp.launch(
+            stretch, pool.size,
+            [scene.box, scene.spacing, sweep, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase, pool.held,
+             pool.position, pool.mass, self.bonds],
+            [correction], device=scene.device,
+        )  # fmt: skip
+
+    def footprint(self) -> dict[str, int]:
+        return {f"bonds.{name}": getattr(self.bonds, name).capacity for name in Bonds.vars}
