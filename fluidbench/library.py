@@ -42,7 +42,7 @@ def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = N
     if isinstance(overrides, list):
         overrides = dict(parse_override(text) for text in overrides)
     for key, value in (overrides or {}).items():
-        _assign(table, key, value)
+        assign(table, key, value)
     return validate(table, str(path))
 
 
@@ -55,10 +55,12 @@ def validate(table: dict[str, Any], where: str) -> Scenario:
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """'key=value' -> (key, value), the value read as TOML and otherwise as a string."""
+    """'key=value' -> (key, value), the value read as TOML and otherwise as a string; `none` takes the key out."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise UserError(f"--set takes key=value, such as material.yield_stress=50; got '{text}'")
+    if value.strip() == "none":
+        return key.strip(), None
     try:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -92,8 +94,8 @@ def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def _assign(table: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key, stepping into tables by name and into lists by number."""
+def assign(table: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key, stepping into tables by name and into lists by number; None takes it out."""
     *parents, last = key.split(".")
     node: Any = table
     for part in parents:
@@ -102,6 +104,8 @@ def _assign(table: dict[str, Any], key: str, value: Any) -> None:
             raise UserError(f"--set {key}: '{part}' is a value, not a table")
     if isinstance(node, list):
         node[_position(node, last, key)] = value
+    elif value is None:
+        node.pop(last, None)
     else:
         node[last] = value
 

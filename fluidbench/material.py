@@ -63,8 +63,9 @@ class Material(BaseModel):
 
     @property
     def is_solid(self) -> bool:
-        """Whether it never flows: elastic, without yield stress or relaxation."""
-        return self.youngs_modulus is not None and self.yield_stress is None and self.relaxation_time is None
+        """Whether it never flows: elastic, without relaxation, yielding not before a shear of 100 % if at all."""
+        elastic = self.youngs_modulus is not None and self.relaxation_time is None
+        return elastic and self.flow_threshold >= self.shear_modulus
 
     @property
     def flow_threshold(self) -> float:

@@ -67,8 +67,8 @@ def force_potential(force: Force, x: wp.vec3):
 
 @wp.func
 def is_solid(phase: Phase):
-    """Whether the material never flows: it remembers shape and volume for ever, and nothing may relax them."""
-    return phase.yield_stress >= NEVER_YIELDS and phase.relaxation_rate == 0.0
+    """Whether the material never flows (see Material.is_solid): nothing may relax its shape or volume."""
+    return phase.shear_modulus > 0.0 and phase.yield_stress >= phase.shear_modulus and phase.relaxation_rate == 0.0
 
 
 class Scene:
@@ -143,6 +143,12 @@ class Scene:
     def lanes(self) -> int:
         """Threads of a kernel that strides over all its work: one on the CPU, a full device on CUDA."""
         return 1 if self.device.is_cpu else 256 * 1024
+
+    def allow_tension(self) -> None:
+        """Let liquids carry tension instead of cavitating."""
+        table = self.phases.numpy()
+        table["tension_limit"] = float(NEVER_YIELDS)
+        self.phases.assign(table)
 
     def set_dt(self, dt: float) -> None:
         if not math.isfinite(dt) or dt <= 0:

@@ -114,6 +114,12 @@ class Simulation:
         self.done += 1
         return steps
 
+    def march(self, dt: float, substeps: int) -> None:
+        """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
+        self._refresh()
+        self.scene.set_dt(dt)
+        self._run(substeps)
+
     def _refresh(self) -> None:
         """Tell the solver, once, of particles that appeared or were moved."""
         if self.pool.stale:

@@ -32,7 +32,8 @@ def draw(plot: Plot, folder: Path) -> Path:
             axes.plot(trace.x, trace.y, "o", mfc="none", color=trace.colour, label=trace.label)
         else:
             marker = "o" if trace.style == "line+points" else ""
-            axes.plot(trace.x, trace.y, marker=marker, color=trace.colour, label=trace.label or None, lw=1.6)
+            line = {"dashed": "--", "dotted": ":"}.get(trace.style, "-")
+            axes.plot(trace.x, trace.y, line, marker=marker, color=trace.colour, label=trace.label or None, lw=1.6)
     axes.set(title=plot.title, xlabel=plot.x, ylabel=plot.y)
     if plot.log:
         axes.set(xscale="log", yscale="log")

@@ -83,9 +83,10 @@ def plotly_html(plot: Plot) -> str:
             figure.add_bar(x=trace.x, y=trace.y, name=trace.label, marker_color=trace.colour, showlegend=False)
         else:
             mode = {"points": "markers", "line+points": "lines+markers"}.get(trace.style, "lines")
+            dash = {"dashed": "dash", "dotted": "dot"}.get(trace.style, "solid")
             figure.add_scatter(
-                x=trace.x, y=trace.y, mode=mode, name=trace.label, line_color=trace.colour, legendgroup=trace.colour,
-                showlegend=bool(trace.label),
+                x=trace.x, y=trace.y, mode=mode, name=trace.label, line={"color": trace.colour, "dash": dash},
+                legendgroup=trace.colour, showlegend=bool(trace.label),
             )  # fmt: skip
     figure.update_layout(
         title=plot.title, xaxis_title=plot.x, yaxis_title=plot.y, template="plotly_white", height=360,

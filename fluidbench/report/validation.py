@@ -65,6 +65,7 @@ def present(trials: Sequence[Trial], root: Path, console: Console) -> bool:
     """Print and write everything; True when no trial missed its tolerance or failed."""
     write_results(trials, root)
     write_markdown(trials, root)
+    write_answers(trials, root)
     page = write_page(trials, root)
     show(console, summary(trials))
     for trial in trials:
@@ -93,6 +94,25 @@ def write_markdown(trials: Sequence[Trial], root: Path) -> Path:
     notes = dict.fromkeys(f"- {t.case.name}, {t.method}: {t.verdict}: {t.note}" for t in trials if t.note)
     write_atomically(root / "validate.md", "\n".join([*lines, "", table.note + ".", "", *notes, ""]))
     return root / "validate.md"
+
+
+def write_answers(trials: Sequence[Trial], root: Path) -> Path:
+    """known_answers.csv, for scenarios/reference: what `select` and `table1` know of each method."""
+    machine = _machine(trials)
+    kept = [t for t in trials if t.finding is not None and t.method != METHOD_OF_LAW]
+    lines = [
+        f"# Made by `fluidbench validate --out OUT` as OUT/known_answers.csv; {machine.get('time', '')[:10]}, "
+        f"fluidbench {machine.get('fluidbench', '')}, {machine.get('device', '')}.",
+        "case,physics,method,spacing_m,particles,error,tolerance,verdict,wall_s,wall_per_simulated_s",
+    ]
+    for t in kept:
+        cost = [t.cost[key] for key in ("wall_s", "wall_per_simulated_s")]
+        lines.append(
+            f"{t.case.name},{t.case.physics},{t.method},{t.spacing:.6g},{t.cost['particles']:.0f},{t.error:.5g},"
+            f"{t.tolerance:g},{t.verdict},{cost[0]:.4g},{cost[1]:.4g}"
+        )
+    write_atomically(root / "known_answers.csv", "\n".join([*lines, ""]))
+    return root / "known_answers.csv"
 
 
 def _machine(trials: Sequence[Trial]) -> dict[str, str]:

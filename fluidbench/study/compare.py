@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,6 +48,14 @@ def tidy(results: Sequence[Finished]) -> pd.DataFrame:
         row |= {f"machine_{k}": v for k, v in record.get("machine", {}).items()}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def lengths_of(record: dict[str, Any]) -> dict[str, float]:
+    """The lengths, areas and slumps of a finished run: what a printer cares about."""
+    wanted = ("bead_width_m", "bead_height_m", "bead_area_m2", "slump", "spread_radius_m", "front_x_m", "height_m")
+    measures = record.get("measures", {})
+    layers = [key for key in measures if key.startswith("layer_")]
+    return {key: float(measures[key]) for key in (*wanted, *layers) if math.isfinite(measures.get(key, math.nan))}
 
 
 def binding(record: dict[str, Any]) -> str:

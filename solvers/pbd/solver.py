@@ -1,5 +1,6 @@
 """Position-based dynamics: allocation, bounds and the order of passes."""
 
+import math
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -63,10 +64,27 @@ class SolverPBD(Solver):
     typical_rate, typical_bytes = 1.2e5, 900.0
 
     @classmethod
+    def usual_dt(cls, scenario: Scenario, config: Any) -> float:
+        """The time step at the scenario's own speed [s]."""
+        bounds = cls.bounds(scenario, config, scenario.reference_speed)
+        return min(scenario.schedule[0], *(bound.dt for bound in bounds))
+
+    @classmethod
+    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
+        m, dt = scenario.material, cls.usual_dt(scenario, config)
+        most = config.shear_stiffness * m.density * (scenario.spacing / dt) ** 2
+        if m.youngs_modulus is None or m.is_solid or m.flow_threshold < most or m.relaxation_time is not None:
+            return None
+        finer = 0.5 * config.advance * math.sqrt(most / m.flow_threshold)
+        return (
+            f"its yield stress ({m.flow_threshold:.3g} Pa) exceeds what a substep conveys ({most:.3g} Pa): "
+            f"it would never yield and shake itself apart; set numerics.pbd.advance = {finer:.2g} or less"
+        )
+
+    @classmethod
     def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
         m, words = scenario.material, []
-        dt = min(bound.dt for bound in cls.bounds(scenario, config, scenario.reference_speed))
-        dt = min(dt, scenario.schedule[0])
+        dt = cls.usual_dt(scenario, config)
         most = largest_viscosity(scenario, config, dt)
         if m.viscosity > most:
             words.append(f"viscosity {m.viscosity:g} Pa s acts like at most {most:.3g} Pa s (XSPH at this dt)")

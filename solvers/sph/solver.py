@@ -50,6 +50,9 @@ class ConfigSPH(Config):
         return self.smoothing_ratio_solid if solid else self.smoothing_ratio
 
 
+FASTEST = 1.0  # Mach number beyond which shocks make matter too dense for its lists
+
+
 class SolverSPH(Solver):
     """WCSPH with Wendland C2 kernel, delta-SPH density diffusion, mirror-image walls, symplectic Euler."""
 
@@ -62,6 +65,16 @@ class SolverSPH(Solver):
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
+
+    @classmethod
+    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
+        speed, c = scenario.reference_speed, scenario.wave_speed
+        if speed < FASTEST * c:
+            return None
+        return (
+            f"it moves at {speed:.3g} m/s, faster than its own sound ({c:.3g} m/s): particles would be pushed "
+            "through each other; raise material.youngs_modulus, bulk_modulus or sound_speed"
+        )
 
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:

@@ -1,4 +1,4 @@
-"""The command line: parses, calls a study, prints. Heavy imports stay inside the commands."""
+"""compare, run and validate: scenarios and cases through the methods."""
 
 import sys
 from pathlib import Path
@@ -6,24 +6,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .errors import UserError
+from .app import (
+    Device,
+    Frames,
+    Out,
+    ScenarioName,
+    Settings,
+    Spacing,
+    WallLimit,
+    app,
+    check_device,
+    load_scenario,
+    split,
+)
 
 if TYPE_CHECKING:
-    from .scenario import Scenario
-    from .study.execute import Finished
-
-app = typer.Typer(
-    name="fluidbench", no_args_is_help=True, add_completion=False, rich_markup_mode=None,
-    help="Measure MPM, weakly compressible SPH and PBD on identical extrusion scenarios: fidelity beside cost.",
-)  # fmt: skip
-
-ScenarioName = Annotated[str, typer.Argument(help="a shipped scenario (see `fluidbench list`) or a TOML file")]
-Settings = Annotated[list[str] | None, typer.Option("--set", help="override a key, e.g. material.yield_stress=50")]
-Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], instead of the scenario's")]
-Device = Annotated[str, typer.Option(help="cpu, or cuda:0, cuda:1, ...")]
-Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/SCENARIO")]
-WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
-Frames = Annotated[bool, typer.Option("--frames", help="keep a snapshot of every output, not only of the last")]
+    from ..study.execute import Finished
 
 
 @app.command()
@@ -77,15 +75,15 @@ def validate(
     """
     from rich.console import Console
 
-    from .report.validation import present
-    from .solver import solver_names
-    from .store import Store
-    from .study.case import select
-    from .study.validate import plan
+    from ..report.validation import present
+    from ..solver import solver_names
+    from ..store import Store
+    from ..study.case import select
+    from ..study.validate import plan
 
-    methods = _split(solvers) or solver_names()
-    _check_device(device)
-    trials = plan(select(cases or []), methods, _split(levels), quick, device, wall_limit)
+    methods = split(solvers) or solver_names()
+    check_device(device)
+    trials = plan(select(cases or []), methods, split(levels), quick, device, wall_limit)
     store = Store((out or Path("fluidbench-out") / "validate").resolve())
     _validate(trials, store, jobs or (2 if device == "cpu" else 1), Console(stderr=True))
     if not present(trials, store.root, Console(width=None if sys.stdout.isatty() else 120)):
@@ -96,8 +94,8 @@ def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None
     """Run the trials: at a terminal under a live display, otherwise with a line for each that has ended."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from .report.validation import line
-    from .study.validate import run
+    from ..report.validation import line
+    from ..study.validate import run
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
@@ -122,73 +120,6 @@ def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None
         run(trials, store, workers, started, step, stopped, ended)
 
 
-@app.command("list")
-def list_() -> None:
-    """Shipped scenarios, cases with known answers and installed methods, one line each."""
-    from .library import load, shipped
-    from .solver import get_solver, solver_names
-    from .study.case import cases
-
-    typer.echo("scenarios")
-    for name in shipped():
-        typer.echo(f"  {name:<20} {load(name).title}")
-    typer.echo("cases with known answers, for validate")
-    for name, case in cases().items():
-        typer.echo(f"  {name:<20} {case.title} ({case.physics})")
-    typer.echo("solvers")
-    for name in solver_names():
-        typer.echo(f"  {name:<20} {(get_solver(name).__doc__ or '').strip().splitlines()[0]}")
-
-
-@app.command()
-def show(scenario: ScenarioName, set_: Settings = None, spacing: Spacing = None) -> None:
-    """The resolved scenario, its derived numbers, each method's bounds, and what a run will need."""
-    from rich.console import Console
-
-    from .report.preview import preview
-    from .report.tables import show as print_table
-
-    resolved = _load(scenario, set_, spacing)
-    console = Console()
-    text, tables = preview(resolved)
-    console.print(text, markup=False, highlight=False)
-    for table in tables:
-        print_table(console, table)
-
-
-@app.command()
-def doctor() -> None:
-    """Devices and versions, what is missing and how to get it."""
-    from .report.preview import diagnosis
-
-    for line in diagnosis():
-        typer.echo(line)
-
-
-def _load(name: str, settings: list[str] | None, spacing: float | None) -> "Scenario":
-    from .library import load
-
-    extra = [f"spacing={spacing!r}"] if spacing is not None else []
-    return load(name, [*(settings or []), *extra])
-
-
-def _split(text: str) -> list[str]:
-    return [part.strip() for part in text.split(",") if part.strip()]
-
-
-def _check_device(device: str) -> None:
-    """Raise UserError unless the device exists."""
-    if device == "cpu":
-        return
-    import warp as wp
-
-    wp.config.quiet = True
-    wp.init()
-    known = ["cpu", *[d.alias for d in wp.get_cuda_devices()]]
-    if device not in known:
-        raise UserError(f"no device '{device}' on this machine; it has {', '.join(known)} (see `fluidbench doctor`)")
-
-
 def _study(
     name: str, solvers: str, settings: list[str] | None, spacing: float | None, repeats: int, device: str,
     out: Path | None, wall_limit: float, frames: bool,
@@ -196,14 +127,14 @@ def _study(
     """compare and run: everything is checked before anything is written."""
     from rich.console import Console
 
-    from .solver import solver_names
-    from .store import Store
-    from .study.compare import jobs
+    from ..solver import solver_names
+    from ..store import Store
+    from ..study.compare import jobs
 
-    scenario = _load(name, settings, spacing)
-    methods = _split(solvers) or solver_names()
+    scenario = load_scenario(name, settings, spacing)
+    methods = split(solvers) or solver_names()
     planned = jobs(scenario, methods, repeats, device, "warp", wall_limit, frames)
-    _check_device(device)
+    check_device(device)
     console, errors = Console(), Console(stderr=True)
     for warning in scenario.warnings():
         errors.print(f"warning: {warning}", markup=False, highlight=False)
@@ -218,7 +149,7 @@ def _run_all(planned: list[Any], store: Any, console: Any) -> list["Finished"]:
     """Run the jobs under a live display; quiet when not at a terminal."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from .study.execute import Hooks, execute
+    from ..study.execute import Hooks, execute
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
@@ -240,13 +171,13 @@ def _run_all(planned: list[Any], store: Any, console: Any) -> list["Finished"]:
 
 def _present(results: list["Finished"], root: Path, console: Any) -> None:
     """Tables in the terminal; figures, tables and the page in the folder."""
-    from .report.figures import draw, draw_views
-    from .report.html import write_page
-    from .report.tables import against_reference, costs, fidelity
-    from .report.tables import show as print_table
-    from .report.traces import plots
-    from .study.compare import tidy, write_tables
-    from .study.execute import ADVICE
+    from ..report.figures import draw, draw_views
+    from ..report.html import write_page
+    from ..report.tables import against_reference, costs, fidelity
+    from ..report.tables import show as print_table
+    from ..report.traces import plots
+    from ..study.compare import tidy, write_tables
+    from ..study.execute import ADVICE
 
     write_tables(tidy(results), root)
     tables = [t for t in (fidelity(results), against_reference(results), costs(results)) if t is not None]
@@ -264,16 +195,3 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
                 f"{result.label}: {verdict}: {result.record['reason']}; {ADVICE.get(verdict, '')}", markup=False
             )
     console.print(f"report: {page}", markup=False, highlight=False, soft_wrap=True)
-
-
-def main() -> None:
-    """Entry point: user errors are one line and exit code 2, an interruption can be resumed."""
-    try:
-        app(standalone_mode=True)
-    except UserError as error:
-        for line in str(error).splitlines():
-            print(f"fluidbench: {line}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        print("fluidbench: interrupted; the same command resumes with what is not finished", file=sys.stderr)
-        sys.exit(130)

@@ -1,0 +1,76 @@
+"""The application, its options and what the commands share."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import UserError
+
+if TYPE_CHECKING:
+    from ..scenario import Scenario
+
+app = typer.Typer(
+    name="fluidbench", no_args_is_help=True, add_completion=False, rich_markup_mode=None,
+    help="Measure MPM, weakly compressible SPH and PBD on identical extrusion scenarios: fidelity beside cost.",
+)  # fmt: skip
+
+ScenarioName = Annotated[str, typer.Argument(help="a shipped scenario (see `fluidbench list`) or a TOML file")]
+Settings = Annotated[list[str] | None, typer.Option("--set", help="override a key, e.g. material.yield_stress=50")]
+Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], instead of the scenario's")]
+Device = Annotated[str, typer.Option(help="cpu, or cuda:0, cuda:1, ...")]
+Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/SCENARIO")]
+WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
+Frames = Annotated[bool, typer.Option("--frames", help="keep a snapshot of every output, not only of the last")]
+
+
+def load_scenario(name: str, settings: list[str] | None, spacing: float | None) -> "Scenario":
+    from ..library import load
+
+    extra = [f"spacing={spacing!r}"] if spacing is not None else []
+    return load(name, [*(settings or []), *extra])
+
+
+def split(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def check_device(device: str) -> None:
+    """Raise UserError unless the device exists."""
+    if device == "cpu":
+        return
+    import warp as wp
+
+    wp.config.quiet = True
+    wp.init()
+    known = ["cpu", *[d.alias for d in wp.get_cuda_devices()]]
+    if device not in known:
+        raise UserError(f"no device '{device}' on this machine; it has {', '.join(known)} (see `fluidbench doctor`)")
+
+
+def fraction(text: str) -> float:
+    """'5%' or '0.05' -> 0.05; raises UserError for what is no positive share."""
+    try:
+        value = float(text.strip().removesuffix("%")) / (100.0 if text.strip().endswith("%") else 1.0)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < 10.0:
+        raise UserError(f"--tolerance takes a share such as 5% or 0.05; got '{text}'")
+    return value
+
+
+def budget_of(text: str) -> tuple[float, float]:
+    """'60s' -> (60, inf), 'realtime' -> (inf, 1), '' -> (inf, inf): wall time [s] and wall s per simulated s."""
+    word = text.strip().lower()
+    if word in ("", "none"):
+        return float("inf"), float("inf")
+    if word == "realtime":
+        return float("inf"), 1.0
+    scale = {"s": 1.0, "m": 60.0, "h": 3600.0}.get(word[-1])
+    try:
+        value = float(word[:-1] if scale else word) * (scale or 1.0)
+    except ValueError:
+        value = -1.0
+    if not value > 0:
+        raise UserError(f"--budget takes a time such as 60s, 5m or 1h, or realtime; got '{text}'")
+    return value, float("inf")

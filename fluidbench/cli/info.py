@@ -1,0 +1,48 @@
+"""list, show and doctor: what there is, before anything runs."""
+
+import typer
+
+from .app import ScenarioName, Settings, Spacing, app, load_scenario
+
+
+@app.command("list")
+def list_() -> None:
+    """Shipped scenarios, cases with known answers and installed methods, one line each."""
+    from ..library import load, shipped
+    from ..solver import get_solver, solver_names
+    from ..study.case import cases
+
+    typer.echo("scenarios")
+    for name in shipped():
+        typer.echo(f"  {name:<20} {load(name).title}")
+    typer.echo("cases with known answers, for validate")
+    for name, case in cases().items():
+        typer.echo(f"  {name:<20} {case.title} ({case.physics})")
+    typer.echo("solvers")
+    for name in solver_names():
+        typer.echo(f"  {name:<20} {(get_solver(name).__doc__ or '').strip().splitlines()[0]}")
+
+
+@app.command()
+def show(scenario: ScenarioName, set_: Settings = None, spacing: Spacing = None) -> None:
+    """The resolved scenario, its derived numbers, each method's bounds, and what a run will need."""
+    from rich.console import Console
+
+    from ..report.preview import preview
+    from ..report.tables import show as print_table
+
+    resolved = load_scenario(scenario, set_, spacing)
+    console = Console()
+    text, tables = preview(resolved)
+    console.print(text, markup=False, highlight=False)
+    for table in tables:
+        print_table(console, table)
+
+
+@app.command()
+def doctor() -> None:
+    """Devices and versions, what is missing and how to get it."""
+    from ..report.preview import diagnosis
+
+    for line in diagnosis():
+        typer.echo(line)

@@ -1,0 +1,223 @@
+"""stability, ablate, select and table1: studies made of many runs."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .app import (
+    Device,
+    Out,
+    ScenarioName,
+    Settings,
+    Spacing,
+    WallLimit,
+    app,
+    budget_of,
+    check_device,
+    fraction,
+    load_scenario,
+    split,
+)
+
+if TYPE_CHECKING:
+    from ..store import Store
+
+Solvers = Annotated[str, typer.Option(help="methods, separated by commas; default all that are installed")]
+Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="experiments at a time; default 2, or 1 on CUDA")]
+
+
+@app.command()
+def stability(
+    scenario: ScenarioName = "line_bead",
+    axis: Annotated[str, typer.Option(help="axes, separated by commas; default all: viscosity, youngs_modulus, "
+                                      "poisson_ratio, yield_stress, exit_speed, density, spacing, "
+                                      "particles_per_cell")] = "",
+    solvers: Solvers = "",
+    set_: Settings = None,
+    spacing: Spacing = None,
+    quick: Quick = False,
+    device: Device = "cpu",
+    out: Out = None,
+    jobs: Jobs = None,
+) -> None:  # fmt: skip
+    """Find the largest stable time step along material and numerical axes, beside each method's bound and theory.
+
+    A second call reuses the points that are finished.
+    """
+    from ..report.stability import report
+    from ..study.case import select
+    from ..study.experiments import run_tasks
+    from ..study.stability import block_tasks, choose, measure_block, measure_point, point_tasks
+
+    resolved, axes = load_scenario(scenario, set_, spacing), choose(split(axis))
+    methods, store, workers = _prepare(solvers, device, out, "stability", jobs)
+    blocks = block_tasks(methods, quick, device)
+    points = point_tasks(resolved, axes, methods, quick, device)
+    stiffness = select(["pbd_stiffness"]) if "pbd" in methods and device == "cpu" else []
+    with _watch("stability", len(blocks) + len(points)) as tell:
+        measured = run_tasks(blocks, measure_block, store, workers, lambda i, _: tell(blocks[i][0]))
+        rows = run_tasks(points, measure_point, store, workers, lambda i, r: tell(f"{points[i][0]} {r.get('verdict')}"))
+    trials = _judged(stiffness, ["pbd"], device, store, workers)
+    _publish(report(resolved, rows, measured, trials), store.root)
+    if any(row.get("verdict") not in ("held", "refused") for row in rows):
+        raise typer.Exit(1)
+
+
+def _prepare(
+    solvers: str, device: str, out: Path | None, verb: str, jobs: int | None
+) -> "tuple[list[str], Store, int]":
+    """Methods, output folder and number of workers; everything is checked before anything is written."""
+    import warp as wp
+
+    from ..solver import get_solver, solver_names
+    from ..store import Store
+
+    wp.config.quiet = True
+
+    methods = split(solvers) or solver_names()
+    for method in methods:
+        get_solver(method)
+    check_device(device)
+    return methods, Store((out or Path("fluidbench-out") / verb).resolve()), jobs or (2 if device == "cpu" else 1)
+
+
+def _judged(cases: list[Any], methods: list[str], device: str, store: "Store", workers: int) -> list[Any]:
+    """Cases with known answers, run and judged without a display."""
+    from ..study.validate import plan, run
+
+    trials = plan(cases, methods, ["coarse"], False, device, 1800.0)
+    run(trials, store, workers, *[lambda *_: None] * 4)
+    return trials
+
+
+class _watch:
+    """A progress bar over the steps of a study; quiet when not at a terminal."""
+
+    def __init__(self, title: str, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self.progress = Progress(*columns, console=console, disable=not console.is_terminal)
+        self.task = self.progress.add_task(title, total=total)
+
+    def __enter__(self) -> Callable[[str], None]:
+        self.progress.start()
+        return lambda text: self.progress.update(self.task, advance=1, description=text)
+
+    def __exit__(self, *_: object) -> None:
+        self.progress.stop()
+
+
+def _publish(report: Any, root: Path) -> None:
+    import sys
+
+    from rich.console import Console
+
+    from ..report.study import publish
+
+    publish(report, root, Console(width=None if sys.stdout.isatty() else 120))
+
+
+@app.command()
+def ablate(
+    scenario: ScenarioName,
+    solvers: Solvers = "",
+    tolerance: Annotated[str, typer.Option(help="how far a length may move, e.g. 5%")] = "5%",
+    set_: Settings = None,
+    spacing: Spacing = None,
+    device: Device = "cpu",
+    out: Out = None,
+    wall_limit: WallLimit = 900.0,
+    jobs: Jobs = None,
+) -> None:
+    """Switch physical features off and numerical economies on, one at a time: what moves, what is saved.
+
+    Ends with the leanest mix that stays within the tolerance, confirmed by a run. A second call reuses finished runs.
+    """
+    from ..report.ablate import report
+    from ..study.ablate import ablate as study
+    from ..study.ablate import changes
+    from ..study.execute import Hooks
+
+    resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
+    methods, store, workers = _prepare(solvers, device, out, "ablate", jobs)
+    total = len(methods) + sum(len(methods) if c.method is None else 1 for c in changes(resolved, methods))
+    with _watch("ablate", total) as tell:
+        hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
+        done = study(resolved, methods, share, store, hooks, workers, device, wall_limit)
+    _publish(report(resolved, scenario, done, share, store.root), store.root)
+
+
+@app.command()
+def select(
+    scenario: ScenarioName,
+    tolerance: Annotated[str, typer.Option(help="largest relative error of any length, e.g. 5%")] = "5%",
+    budget: Annotated[str, typer.Option(help="wall time of a run, e.g. 60s, or realtime; default none")] = "",
+    solvers: Solvers = "",
+    set_: Settings = None,
+    spacing: Spacing = None,
+    device: Device = "cpu",
+    out: Out = None,
+    wall_limit: WallLimit = 900.0,
+) -> None:
+    """Recommend a method, spacing and time step: least cost within a tolerance, on this machine, with the evidence.
+
+    Runs every method at four spacings. A second call, with another tolerance or budget, reuses the runs.
+    """
+    from ..report.select import report
+    from ..study.execute import Hooks
+    from ..study.select import FACTORS
+    from ..study.select import select as study
+
+    resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
+    seconds, pace = budget_of(budget)
+    methods, store, _ = _prepare(solvers, device, out, f"select-{resolved.name}", 1)
+    with _watch("select", len(methods) * len(FACTORS)) as tell:
+        hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
+        chosen = study(resolved, methods, store, hooks, device, wall_limit)
+    _publish(report(resolved, scenario, chosen, share, seconds, pace, store.root), store.root)
+    if not chosen.candidates:
+        raise typer.Exit(1)
+
+
+@app.command()
+def table1(
+    scenario: ScenarioName = "line_bead",
+    repeats: Annotated[int, typer.Option(min=2, help="runs of each method on the scenario, for the spread")] = 3,
+    set_: Settings = None,
+    spacing: Spacing = None,
+    quick: Quick = False,
+    device: Device = "cpu",
+    out: Out = None,
+    wall_limit: WallLimit = 1800.0,
+    jobs: Jobs = None,
+) -> None:
+    """Judge the published table of adjectives: every cell beside a measured number and a verdict computed by a rule.
+
+    A second call reuses the runs that are finished.
+    """
+    from ..report.table1 import report
+    from ..study.execute import Hooks
+    from ..study.table1 import chosen_cases, gather, levels_of
+    from ..study.validate import plan, run
+
+    coarser = 4 / 3 if quick and spacing is None else 1.0
+    resolved = load_scenario(scenario, set_, spacing)
+    resolved = load_scenario(scenario, set_, coarser * resolved.spacing)
+    methods, store, workers = _prepare("mpm,sph,pbd", device, out, "table1", jobs)
+    trials = [
+        trial for case in chosen_cases(quick)
+        for trial in plan([case], methods, levels_of(case, quick), False, device, wall_limit)
+    ]  # fmt: skip
+    with _watch("known answers", len(trials)) as tell:
+        none = lambda *_: None  # noqa: E731
+        run(trials, store, workers, none, none, none, lambda t: tell(f"{t.case.name} {t.method} {t.verdict}"))
+    with _watch("the scenario", 3 * repeats + 8) as tell:
+        hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
+        evidence = gather(resolved, trials, repeats, store, hooks, device, wall_limit)
+    _publish(report(evidence, store.root), store.root)

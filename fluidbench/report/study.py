@@ -1,0 +1,72 @@
+"""One shape for what every study shows: findings in words, tables, plots; printed, and written as page and data."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..store import write_atomically
+from .html import environment, plotly_html, script
+from .tables import Table, show
+from .traces import Plot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.console import Console
+
+PAGE = """{% extends "base" %}{% block body %}<p>{{ subtitle }}</p>
+<h2>Findings</h2><ul>{% for line in findings %}<li>{{ line }}</li>{% endfor %}</ul>
+{% for table in tables %}<h2 id="table-{{ loop.index }}">{{ table.title }}</h2>
+{{ rows(table) }}
+{% if table.note %}<p>{{ table.note }}</p>{% endif %}{% endfor %}
+{% if plots %}<h2>Plots</h2>
+<div class="grid">{% for plot in plots %}<div>{{ plot }}</div>{% endfor %}</div>{% endif %}
+{% if runs %}<h2>Runs</h2><ul>
+{% for label, path in runs %}<li id="{{ label }}"><a href="{{ path }}">{{ label }}</a></li>{% endfor %}</ul>{% endif %}
+<p>{{ machine }}</p>{% endblock %}
+"""
+
+
+@dataclass
+class Report:
+    """What a study found; `data` holds one row an experiment, `runs` the records behind it (label, path)."""
+
+    verb: str
+    title: str
+    subtitle: str
+    findings: list[str]
+    tables: list[Table]
+    data: pd.DataFrame
+    plots: list[Plot] = field(default_factory=list)
+    runs: list[tuple[str, str]] = field(default_factory=list)
+    machine: str = ""
+
+
+def publish(report: Report, root: Path, console: Console) -> Path:
+    """Print the tables and findings; write VERB.parquet, VERB.json, a PNG for each plot and report.html."""
+    import io
+
+    from markupsafe import Markup
+
+    from .figures import draw
+
+    buffer = io.BytesIO()
+    report.data.to_parquet(buffer)
+    write_atomically(root / f"{report.verb}.parquet", buffer.getvalue())
+    rows = json.loads(str(report.data.to_json(orient="records")))
+    write_atomically(root / f"{report.verb}.json", json.dumps({"findings": report.findings, "rows": rows}, indent=1))
+    for plot in report.plots:
+        draw(plot, root)
+    page = environment({"page": PAGE}).get_template("page").render(
+        title=report.title, subtitle=report.subtitle, findings=report.findings, tables=report.tables, script=script(),
+        plots=[Markup(plotly_html(plot)) for plot in report.plots], runs=report.runs, machine=report.machine,
+    )  # fmt: skip
+    write_atomically(root / "report.html", page)
+    for table in report.tables:
+        show(console, table)
+    for line in report.findings:
+        console.print(f"- {line}", markup=False, highlight=False)
+    console.print(f"report: {root / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
+    return root / "report.html"

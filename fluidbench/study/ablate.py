@@ -1,0 +1,195 @@
+"""`ablate`: what a scenario requires, and what it pays for without need: one change at a time, then the leanest mix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import UserError
+from ..run import Job
+from ..scenario import Friction, Scenario
+from ..solver import configure, get_solver
+from ..store import Store
+from .compare import lengths_of
+from .execute import Finished, Hooks, execute
+from .stability import varied
+
+WORTH = 0.05  # a saving below this is lost in the noise of a shared machine
+SOFTER, COARSER, QUIETER = 0.25, 1.25, 0.5  # factors on Young's modulus, spacing, sound speed
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing made simpler: dotted keys and their new values (None takes a key out), for one method or for all."""
+
+    name: str
+    settings: dict[str, Any]
+    method: str | None = None
+
+
+@dataclass
+class Effect:
+    """What a change did to a method: how far which length moved, and the share of the time it saved."""
+
+    change: Change
+    method: str
+    run: Finished
+    moved: float = float("nan")
+    length: str = ""
+    saved: float = float("nan")
+
+    @property
+    def ok(self) -> bool:
+        return self.run.ok
+
+
+@dataclass
+class Ablation:
+    """All effects, and for each method the leanest mix that was confirmed by a run."""
+
+    base: dict[str, Finished]
+    effects: list[Effect] = field(default_factory=list)
+    lean: dict[str, Effect] = field(default_factory=dict)
+
+
+def changes(scenario: Scenario, methods: Sequence[str]) -> list[Change]:
+    """Every physical feature that can be switched off, every numerical economy that can be switched on."""
+    return [*features(scenario), *economies(scenario, methods)]
+
+
+def features(scenario: Scenario) -> list[Change]:
+    m, found = scenario.material, []
+    if m.youngs_modulus is not None and not m.is_solid:
+        liquid = {f"material.{key}": None for key in ("youngs_modulus", "yield_stress", "plastic_viscosity")}
+        liquid |= {"material.relaxation_time": None, "material.viscosity": max(m.viscosity, m.plastic_viscosity)}
+        found.append(Change("no elasticity, no yield: a Newtonian liquid", liquid))
+    if m.yield_stress:
+        found.append(Change("no yield stress", {"material.yield_stress": 0.0}))
+    if m.plastic_viscosity > 0:
+        found.append(Change("no plastic viscosity", {"material.plastic_viscosity": 0.0}))
+    if m.viscosity > 0:
+        found.append(Change("no viscosity", {"material.viscosity": 0.0}))
+    rough = {
+        f"domain.walls.{face}": "slip" for face, wall in scenario.domain.walls if isinstance(wall, Friction)
+    }  # fmt: skip
+    if rough:
+        found.append(Change("no friction", rough))
+    if scenario.domain.walls.z_lower == "stick":
+        found.append(Change("slip floor", {"domain.walls.z_lower": "slip"}))
+    return found
+
+
+def economies(scenario: Scenario, methods: Sequence[str]) -> list[Change]:
+    m = scenario.material
+    found = [Change("coarser spacing", {"spacing": COARSER * scenario.spacing})]
+    if m.youngs_modulus is not None:
+        found.append(Change("softer elasticity", {"material.youngs_modulus": SOFTER * m.youngs_modulus}))
+    elif m.sound_speed is None and m.bulk_modulus is None:
+        found.append(Change("slower sound", {"sound_speed_ratio": QUIETER * scenario.sound_speed_ratio}))
+    for method in methods:
+        config: Any = configure(get_solver(method), scenario)
+        found += [
+            Change(name, {f"numerics.{method}.{key}": value for key, value in settings.items()}, method)
+            for name, settings in _numerical(method, config, scenario)
+        ]
+    return found
+
+
+def _numerical(method: str, config: Any, scenario: Scenario) -> list[tuple[str, dict[str, Any]]]:
+    """(name, settings of the method's own section); a method that is not known here has none."""
+    if method == "mpm":
+        return [
+            ("coarser grid", {"grid_ratio": round(min(1.33 * config.grid_ratio, 4.0), 3)}),
+            ("larger dt", {"safety": 1.0}),
+            ("no volume feedback", {"volume_feedback": 0.0}),
+        ]
+    if method == "sph":
+        solid = scenario.material.youngs_modulus is not None
+        key = "smoothing_ratio_solid" if solid else "smoothing_ratio"
+        return [
+            ("fewer neighbours", {key: round(max(0.8 * config.smoothing(solid), 1.2), 3)}),
+            ("larger dt", {"cfl": 2.0 * config.cfl, "viscous_number": 0.11}),
+            ("no density feedback", {"density_feedback": 0.0}),
+        ]
+    if method == "pbd":
+        found = [
+            ("fewer iterations", {"iterations": max(1, config.iterations // 2)}),
+            ("larger dt", {"advance": min(2.0 * config.advance, 1.0)}),
+            ("fewer neighbours", {"support_ratio": 2.0}),
+        ]
+        return [*found, *([("fewer sweeps", {"shear_sweeps": 4})] if scenario.material.viscosity > 0 else [])]
+    return []
+
+
+def ablate(
+    scenario: Scenario, methods: Sequence[str], tolerance: float, store: Store, hooks: Hooks, workers: int,
+    device: str, wall_limit: float,
+) -> Ablation:  # fmt: skip
+    """Run everything; the leanest mixes last."""
+
+    def job(settings: dict[str, Any], method: str) -> Job:
+        changed = varied(scenario.model_dump(mode="json"), settings)
+        return Job(changed.model_dump(mode="json"), method, device, wall_limit=wall_limit)
+
+    wanted = [(c, m) for c in changes(scenario, methods) for m in methods if c.method in (None, m)]
+    planned = []
+    for change, method in wanted:
+        try:
+            planned.append((change, method, job(change.settings, method)))
+        except UserError:
+            continue  # a nozzle too fine for the coarser spacing, say: not a change that this scenario allows
+    runs = execute([job({}, m) for m in methods] + [j for *_, j in planned], store, hooks, workers)
+    result = Ablation(dict(zip(methods, runs, strict=False)))
+    for (change, method, _), run in zip(planned, runs[len(methods) :], strict=True):
+        result.effects.append(effect(change, method, run, result.base[method]))
+    for method in methods:
+        if result.base[method].ok:
+            lean = _leanest(result, method, tolerance, lambda s, m: execute([job(s, m)], store, hooks)[0])
+            if lean is not None:
+                result.lean[method] = lean
+    return result
+
+
+def effect(change: Change, method: str, run: Finished, base: Finished) -> Effect:
+    """Compare a run with the unchanged one."""
+    seen = Effect(change, method, run)
+    if run.ok and base.ok:
+        before, after = lengths_of(base.record), lengths_of(run.record)
+        shifts = {key: abs(after.get(key, 0.0) / value - 1.0) for key, value in before.items() if value}
+        seen.length, seen.moved = max(shifts.items(), key=lambda item: item[1], default=("", float("nan")))
+        clock = "cpu_s" if base.record["device"] == "cpu" else "wall_s"
+        seen.saved = 1.0 - run.record["cost"][clock] / base.record["cost"][clock]
+    return seen
+
+
+def _leanest(result: Ablation, method: str, tolerance: float, run: Any) -> Effect | None:
+    """Join the changes that save most while their shifts add up to less than the tolerance; confirm by a run, and leave
+    out the one that moves most until the run agrees."""
+    free = [e for e in result.effects if e.method == method and e.ok and e.saved > WORTH and e.moved <= tolerance]
+    chosen: list[Effect] = []
+    for candidate in sorted(free, key=lambda e: -e.saved):
+        if sum(e.moved for e in chosen) + candidate.moved <= tolerance and not _clash(candidate, chosen):
+            chosen.append(candidate)
+    while chosen:
+        settings = {key: value for e in chosen for key, value in e.change.settings.items()}
+        joined = Change(" + ".join(e.change.name for e in chosen), settings, method)
+        seen = effect(joined, method, run(settings, method), result.base[method])
+        if seen.ok and seen.moved <= tolerance and seen.saved > WORTH:
+            return seen
+        chosen.remove(max(chosen, key=lambda e: e.moved))
+    return None
+
+
+def _clash(candidate: Effect, chosen: Sequence[Effect]) -> bool:
+    return any(set(candidate.change.settings) & set(e.change.settings) for e in chosen)
+
+
+def command(scenario: str, seen: Effect) -> str:
+    """The command that runs a lean mix alone."""
+    sets = " ".join(f"--set {key}={_toml(value)}" for key, value in seen.change.settings.items())
+    return f"fluidbench run {scenario} --solver {seen.method} {sets}"
+
+
+def _toml(value: Any) -> str:
+    return "none" if value is None else str(value)

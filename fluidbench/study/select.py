@@ -1,0 +1,230 @@
+"""`select`: which method and spacing meet a tolerance at least cost on this machine, and on what evidence.
+
+A scenario without an exact answer gets its error estimated in three parts, all relative to a length:
+
+- discretisation: each length is extrapolated within a method to zero spacing at first order (what these methods show on
+  extrusion), by least squares over all spacings run, the finer ones counting more; the error at a spacing is the
+  distance to that limit, or the scatter about the fit from there down if that is larger;
+- bias: the distance of a method's limit from the consensus, the mean limit of the trusted methods;
+- trust: a method is trusted when it passes most known answers of the scenario's own physics
+  (scenarios/reference/known_answers.csv, made by `fluidbench validate`).
+
+A length with an exact answer (a bead's area) is judged against that alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..measure.reference import table as reference
+from ..run import Job
+from ..scenario import Scenario
+from ..store import Store
+from .compare import lengths_of
+from .execute import Finished, Hooks, execute
+
+FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
+ENOUGH = 3  # spacings needed for an extrapolation
+
+
+@dataclass(frozen=True)
+class Trust:
+    """How a method did on the known answers of the scenario's physics."""
+
+    passed: int
+    judged: int
+
+    @property
+    def trusted(self) -> bool:
+        return self.passed > 0.5 * self.judged
+
+
+@dataclass
+class Candidate:
+    """One method at one spacing: its cost, its estimated error and the parts of it."""
+
+    method: str
+    spacing: float
+    dt: float
+    wall: float
+    pace: float  # wall s per simulated s
+    discretisation: float
+    bias: float
+    run: Finished
+
+    @property
+    def error(self) -> float:
+        return self.discretisation + self.bias
+
+
+@dataclass
+class Selection:
+    """Everything that the choice rests on."""
+
+    candidates: list[Candidate]
+    trust: dict[str, Trust]
+    limits: dict[str, dict[str, float]]
+    runs: list[Finished]
+    notes: list[str] = field(default_factory=list)
+
+    def front(self) -> list[Candidate]:
+        """The candidates that none beats in both cost and error, cheapest first."""
+        best, kept = math.inf, []
+        for c in sorted(self.candidates, key=lambda c: (c.wall, c.error)):
+            if c.error < best:
+                best = c.error
+                kept.append(c)
+        return kept
+
+    def recommend(self, tolerance: float, budget: float, pace: float) -> tuple[Candidate | None, str]:
+        """The cheapest within tolerance, wall time [s] and pace (wall s per simulated s); or the nearest, and why."""
+        good = [c for c in self.candidates if c.error <= tolerance]
+        affordable = [c for c in good if c.wall <= budget and c.pace <= pace]
+        if affordable:
+            return min(affordable, key=lambda c: c.wall), ""
+        if good:
+            return min(good, key=lambda c: c.wall), "nothing within the tolerance meets the budget; this is the fastest"
+        if self.candidates:
+            return min(self.candidates, key=lambda c: c.error), "nothing tried meets the tolerance; this is the nearest"
+        return None, "no method completed at three spacings"
+
+
+def physics_of(scenario: Scenario) -> set[str]:
+    """The classes of known answers that the scenario's material and process belong to."""
+    m = scenario.material
+    classes = {"emission"} if scenario.nozzle is not None else set()
+    if m.relaxation_time is not None:
+        return classes | {"viscoelastic"}
+    if m.is_solid:
+        return classes | {"elastic"}
+    if m.yield_stress:
+        return classes | {"yield stress"}
+    return classes | ({"viscous"} if m.viscosity > 0 else {"liquid"})
+
+
+def trust_of(scenario: Scenario, methods: Sequence[str]) -> dict[str, Trust]:
+    """From the shipped table of known answers: cases of this physics within their tolerance."""
+    rows = reference("known_answers")
+    near = [row for row in rows.to_dict("records") if row["physics"] in physics_of(scenario)]
+    found = {}
+    for method in methods:
+        own = [row["error"] <= row["tolerance"] for row in near if row["method"] == method]
+        found[method] = Trust(sum(own), len(own))
+    return found
+
+
+def select(
+    scenario: Scenario, methods: Sequence[str], store: Store, hooks: Hooks, device: str, wall_limit: float
+) -> Selection:
+    """Run every method at every spacing, one at a time so that times mean something, and estimate all errors."""
+    jobs = []
+    for method in methods:
+        for factor in FACTORS:
+            table = scenario.model_dump(mode="json") | {"spacing": factor * scenario.spacing}
+            if _valid(table):
+                jobs.append(Job(table, method, device, wall_limit=wall_limit))
+    return assess(scenario, methods, execute(jobs, store, hooks))
+
+
+def _valid(table: dict[str, Any]) -> bool:
+    from pydantic import ValidationError
+
+    try:
+        Scenario.model_validate(table)
+    except ValidationError:
+        return False
+    return True
+
+
+def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Finished]) -> Selection:
+    """Errors of all candidates from finished runs."""
+    result = Selection([], trust_of(scenario, methods), {}, list(runs))
+    fits: dict[str, dict[str, Fit]] = {}
+    for method in methods:
+        own = [r for r in runs if r.ok and r.label == method]
+        if len(own) < ENOUGH:
+            result.notes.append(f"{method}: only {len(own)} spacings completed, {ENOUGH} are needed")
+            continue
+        fits[method] = {key: extrapolate(own, key) for key in lengths_of(own[0].record)}
+        result.limits[method] = {key: fit.limit for key, fit in fits[method].items()}
+    consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
+    if not trusted:
+        result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
+    for run in runs:
+        if run.ok and run.label in fits:
+            result.candidates.append(_candidate(run, fits[run.label], consensus))
+    return result
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A length as limit + slope d: its limit at zero spacing, and its distance from the fit at each spacing."""
+
+    limit: float
+    residual: dict[float, float]
+
+    def scatter(self, spacing: float) -> float:
+        """The largest distance from the fit at this spacing and finer ones."""
+        return max(r for d, r in self.residual.items() if d <= spacing * (1 + 1e-9))
+
+
+def extrapolate(runs: Sequence[Finished], key: str) -> Fit:
+    """First order in the spacing, weighted by its inverse."""
+    d = np.array([r.record["spacing_m"] for r in runs])
+    q = np.array([lengths_of(r.record)[key] for r in runs])
+    slope, limit = np.polyfit(d, q, 1, w=1.0 / d)
+    residual = np.abs(q - (slope * d + limit))
+    return Fit(float(limit), dict(zip(d.tolist(), residual.tolist(), strict=True)))
+
+
+def exact_lengths(run: Finished) -> dict[str, float]:
+    """Lengths with an exact answer in a record."""
+    names = {"bead area [m^2]": "bead_area_m2"}
+    return {names[a["quantity"]]: a["reference"] for a in run.record.get("answers", []) if a["quantity"] in names}
+
+
+def _consensus(result: Selection) -> dict[str, float]:
+    """Mean limit of the trusted methods (of all, if none is) for each length."""
+    voters = [m for m in result.limits if result.trust[m].trusted] or list(result.limits)
+    keys = {key for m in voters for key in result.limits[m]}
+    return {k: float(np.mean([result.limits[m][k] for m in voters if k in result.limits[m]])) for k in keys}
+
+
+def _candidate(run: Finished, fits: dict[str, Fit], consensus: dict[str, float]) -> Candidate:
+    """The worst length decides."""
+    record = run.record
+    parts, exact = [(0.0, 0.0)], exact_lengths(run)
+    for key, value in lengths_of(record).items():
+        if key in exact:
+            parts.append((abs(value / exact[key] - 1.0), 0.0))
+            continue
+        limit, scatter = fits[key].limit, fits[key].scatter(record["spacing_m"])
+        scale = abs(consensus.get(key, limit)) or 1.0
+        bias = abs(limit - consensus.get(key, limit)) / scale
+        parts.append((max(abs(value - limit), scatter) / scale, bias))
+    discretisation, bias = max(parts, key=sum)
+    cost = record["cost"]
+    return Candidate(
+        run.label, record["spacing_m"], cost["mean_dt_s"], cost["wall_s"], cost["wall_per_simulated_s"], discretisation,
+        bias, run,
+    )  # fmt: skip
+
+
+def confidence(result: Selection, tolerance: float) -> str:
+    """How sure the estimate is: high when two or more trusted methods agree within the tolerance, medium when they do
+    not or when one is trusted, otherwise low."""
+    trusted = [m for m in result.limits if result.trust[m].trusted]
+    if len(trusted) >= 2:
+        keys = set.intersection(*(set(result.limits[m]) for m in trusted))
+        spread = [np.ptp(v) / abs(np.mean(v)) for k in keys if (v := [result.limits[m][k] for m in trusted])]
+        widest = float(max(spread, default=0.0))
+        word = "high" if widest <= tolerance else "medium"
+        return f"{word}: the limits of {' and '.join(trusted)} differ by at most {widest:.1%}"
+    if trusted:
+        return f"medium: only {trusted[0]} passes most known answers of this physics"
+    return "low: no method passes most known answers of this physics"

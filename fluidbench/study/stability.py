@@ -1,0 +1,264 @@
+"""`stability`: the largest stable time step along each axis, beside each method's own bound and theory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import UserError, suggestion
+from ..library import validate
+from ..measure.reference import table as reference
+from ..scenario import Scenario
+from ..solver import configure, get_solver
+from ..timestep import damped_limit
+from .experiments import Task
+
+HELD, FAILED, REFUSED = "held", "failed", "refused"
+OPENING_STEPS = 2000  # substeps of the scenario itself, from its start, in a full study
+SPACINGS = (1 / 3, 0.5, 1.0, 2.0, 8 / 3)
+BARE = {
+    "sph": {"density_diffusion": 0.0, "density_feedback": 0.0, "artificial_viscosity": 0.0,
+            "artificial_viscosity_solid": 0.0, "artificial_stress": 0.0},
+}  # fmt: skip
+"""Settings that leave of a method what the theory knows of it."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A quantity to vary: its key in the scenario, its values (all, and those of a quick study), its unit."""
+
+    key: str
+    values: tuple[float, ...]
+    quick: tuple[float, ...]
+    unit: str
+
+    def setting(self, scenario: Scenario, value: float) -> dict[str, Any]:
+        """Dotted keys of the scenario at a value."""
+        return {self.key: value}
+
+
+class Spacing(Axis):
+    def setting(self, scenario: Scenario, value: float) -> dict[str, Any]:
+        return {self.key: value * scenario.spacing}
+
+
+class ParticlesPerCell(Axis):
+    def setting(self, scenario: Scenario, value: float) -> dict[str, Any]:
+        return {self.key: value ** (1 / 3)}
+
+
+AXES = {
+    "viscosity": Axis("material.viscosity", (1e-3, 1e-1, 1.0, 10.0, 1e2, 1e3, 1e4, 1e5), (1e-3, 10.0, 1e5), "Pa s"),
+    "youngs_modulus": Axis("material.youngs_modulus", (1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9), (1e3, 1e6, 1e9), "Pa"),
+    "poisson_ratio": Axis("material.poisson_ratio", (0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499), (0.0, 0.3, 0.499), "-"),
+    "yield_stress": Axis("material.yield_stress", (0.0, 1.0, 10.0, 1e2, 1e3, 1e4, 1e5), (0.0, 1e2, 1e5), "Pa"),
+    "exit_speed": Axis("nozzle.exit_speed", (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0), (0.01, 0.3, 10.0), "m/s"),
+    "density": Axis("material.density", (10.0, 100.0, 1e3, 3e3, 1e4), (10.0, 1e3, 1e4), "kg/m^3"),
+    "spacing": Spacing("spacing", SPACINGS, (SPACINGS[0], 1.0, SPACINGS[-1]), "of the scenario's"),
+    "particles_per_cell": ParticlesPerCell("numerics.mpm.grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-"),
+}  # fmt: skip
+
+
+def choose(names: Sequence[str]) -> dict[str, Axis]:
+    """The axes named, or all; raises UserError with the nearest known name."""
+    for name in names:
+        if name not in AXES:
+            raise UserError(f"no axis '{name}'{suggestion(name, AXES)}")
+    return {name: AXES[name] for name in names or AXES}
+
+
+def point_tasks(
+    scenario: Scenario, axes: dict[str, Axis], methods: Sequence[str], quick: bool, device: str
+) -> list[tuple[str, Task]]:
+    """(label, task) of every point of every axis; particles per cell are a matter of MPM alone."""
+    tasks = []
+    for name, axis in axes.items():
+        for method in methods if name != "particles_per_cell" else [m for m in methods if m == "mpm"]:
+            for value in axis.quick if quick else axis.values:
+                task = {
+                    "scenario": scenario.model_dump(mode="json"), "settings": axis.setting(scenario, value),
+                    "axis": name, "value": value, "method": method, "quick": quick, "device": device,
+                }  # fmt: skip
+                tasks.append((f"{name}-{method}", task))
+    return tasks
+
+
+def measure_point(task: Task) -> dict[str, Any]:
+    """One point: do the defaults hold, and where are the limits of the resting block and of the thrown lump?"""
+    from .limits import Limit, bisect, block, block_limit, default_dt, lump_survives
+
+    row = {key: task[key] for key in ("axis", "value", "method")}
+    solver = get_solver(task["method"])
+    try:
+        scenario = varied(task["scenario"], task["settings"])
+        config = configure(solver, scenario)
+        refusal = solver.refuses(scenario, config)
+    except UserError as error:
+        return row | {"verdict": REFUSED, "reason": str(error).splitlines()[0]}
+    if refusal is not None:
+        return row | {"verdict": REFUSED, "reason": refusal}
+    device, precision = task["device"], 0.2 if task["quick"] else 0.05
+    own, binding = default_dt(scenario, solver, config)
+    trouble = lump_survives(scenario, solver, config, own, device)
+    if trouble is None and not task["quick"]:
+        trouble = opening(scenario, task["method"], device)
+    row |= {
+        "verdict": HELD if trouble is None else FAILED, "reason": trouble or "", "binding": binding, "dt_own_s": own,
+        "dt_theory_s": theory(task["method"], scenario, config),
+    }  # fmt: skip
+    if task["method"] == "pbd":  # no bound of stability: is it still sound far beyond its bound of accuracy?
+        beyond = lump_survives(scenario, solver, config, 8 * own, device) is None
+        limit = Limit(8 * own, math.inf) if beyond else Limit(own, 8 * own)
+    else:
+        limit = bisect(lambda dt: lump_survives(scenario, solver, config, dt, device) is None, own, precision, 8.0)
+        still = block(block_material(scenario), scenario.spacing).model_copy(update={"numerics": scenario.numerics})
+        row["dt_block_s"] = block_limit(still, solver, config, own, precision, device).dt
+    return row | {"dt_lump_s": limit.stable, "lump_limit_found": math.isfinite(limit.unstable)}
+
+
+def varied(table: dict[str, Any], settings: dict[str, Any]) -> Scenario:
+    """A scenario with dotted keys changed; raises UserError where that makes no scenario."""
+    from ..library import assign
+
+    changed = Scenario.model_validate(table).model_dump(mode="json", exclude_none=True)
+    for key, value in settings.items():
+        if key.startswith("nozzle") and "nozzle" not in changed:
+            raise UserError(f"{key}: the scenario has no nozzle")
+        if key == "nozzle.exit_speed":
+            changed["nozzle"].pop("flow_rate", None)
+        assign(changed, key, value)
+    return validate(changed, changed["name"])
+
+
+def block_material(scenario: Scenario) -> dict[str, Any]:
+    """The scenario's material as a block that has not yielded: yielding is implicit and takes no part in stability."""
+    m = scenario.material.model_dump(exclude_none=True)
+    if scenario.material.relaxation_time is None:
+        m.pop("yield_stress", None)
+        m["plastic_viscosity"] = 0.0
+    if scenario.material.youngs_modulus is None and not {"sound_speed", "bulk_modulus"} & set(m):
+        m["sound_speed"] = scenario.liquid_sound_speed
+    return m
+
+
+def opening(scenario: Scenario, method: str, device: str) -> str | None:
+    """None if the scenario's first steps go well, otherwise what went wrong."""
+    from ..simulation import Simulation
+
+    sim = Simulation(scenario, method, device)
+    substeps = 0
+    while substeps < OPENING_STEPS and sim.done < sim.ticks:
+        substeps += sim.advance().substeps
+        if trouble := sim.look().complaint or sim.fault():
+            return trouble
+    return None
+
+
+def theory(method: str, scenario: Scenario, config: Any) -> float | None:
+    """Largest stable dt [s] in bulk by the Fourier analyses of validation H, wave and viscous limits combined as for a
+    damped oscillator; None for a method that has no such limit.
+
+    The method's own bounds carry the wave speed and the viscosity (artificial included); only their numbers differ.
+    """
+    numbers = {"mpm": _mpm_numbers, "sph": _sph_numbers}.get(method)
+    if numbers is None:
+        return None
+    acoustic, viscous = numbers(scenario, config)
+    own = {b.name: b.dt for b in get_solver(method).bounds(scenario, config, 0.0)}
+    return damped_limit(own["acoustic"] * acoustic, own.get("viscous", math.inf) * viscous)
+
+
+def _mpm_numbers(scenario: Scenario, config: Any) -> tuple[float, float]:
+    """Bulk limits over the method's own, which are those of an isolated particle."""
+    rows = reference("mpm_stability_limits").set_index(["material", "arrangement", "gradient"])
+    bulk, alone = "3d bulk 8 per cell regular", "3d isolated particle"
+
+    def limit(material: str, arrangement: str) -> float:
+        row = rows.loc[(material, arrangement, "mls")]
+        return float(row["min"] + row["max"]) / 2
+
+    acoustic, viscous = (limit(m, bulk) / (config.safety * limit(m, alone)) for m in ("fluid", "viscous"))
+    return acoustic, viscous
+
+
+def _sph_numbers(scenario: Scenario, config: Any) -> tuple[float, float]:
+    rows = reference("sph_stability_limits")
+    rows = rows[rows["kernel"] == "wendland_c2"]
+    ratio = config.smoothing(scenario.material.youngs_modulus is not None)
+    acoustic, viscous = (float(np.interp(ratio, rows["h_over_dx"], rows[key])) for key in ("C_h", "D_monaghan"))
+    return acoustic / config.cfl, viscous / config.viscous_number
+
+
+BLOCKS = {
+    "acoustic": {"density": 1000.0, "sound_speed": 10.0},
+    "viscous": {"density": 1000.0, "sound_speed": 0.05, "viscosity": 100.0},
+    "elastic": {"density": 1000.0, "youngs_modulus": 1e5},
+}  # fmt: skip
+"""Materials whose limit is known."""
+
+
+def block_tasks(methods: Sequence[str], quick: bool, device: str) -> list[tuple[str, Task]]:
+    """The blocks of validation H, for methods that have a theory."""
+    return [
+        (f"block-{kind}-{method}", {"kind": kind, "method": method, "precision": 0.1 if quick else 0.03,
+                                    "device": device})
+        for method in methods if method in ("mpm", "sph") for kind in BLOCKS
+    ]  # fmt: skip
+
+
+def measure_block(task: Task) -> dict[str, Any]:
+    """A block's limit against theory, the method stripped of what theory does not know."""
+    from .limits import block, block_limit, default_dt
+
+    solver = get_solver(task["method"])
+    config = solver.Config(**BARE.get(task["method"], {}))
+    scenario = block(BLOCKS[task["kind"]], 0.01)
+    own, _ = default_dt(scenario, solver, config)
+    limit = block_limit(scenario, solver, config, own, task["precision"], task["device"])
+    return {
+        "kind": task["kind"], "method": task["method"], "dt_limit_s": limit.dt, "dt_own_s": own,
+        "dt_theory_s": theory(task["method"], scenario, config),
+    }  # fmt: skip
+
+
+def findings(points: Sequence[dict[str, Any]], blocks: Sequence[dict[str, Any]]) -> list[str]:
+    """One sentence each: agreement with theory, whether defaults held, what narrows each method's step most."""
+    lines = []
+    for b in blocks:
+        ratio = b["dt_limit_s"] / b["dt_theory_s"]
+        lines.append(
+            f"{b['method']}, {b['kind']} block: stable up to dt = {b['dt_limit_s']:.3g} s, {ratio:.2f} of theory; the "
+            f"method's own bound is {b['dt_own_s'] / b['dt_limit_s']:.2f} of what was measured."
+        )
+    verdicts = [p.get("verdict", FAILED) for p in points]
+    counts = {v: verdicts.count(v) for v in (HELD, REFUSED, FAILED)}
+    lines.append(
+        f"Default steps: {len(points)} points tried, {counts[HELD]} held, {counts[REFUSED]} refused, "
+        f"{counts[FAILED]} failed."
+    )
+    pairs = dict.fromkeys((p["axis"], p["method"]) for p in points)
+    lines += [_narrowing(points, axis, method) for axis, method in pairs]
+    lines += [
+        f"{p['method']}, {p['axis']} = {p['value']:g}: {p['verdict']}: {p['reason']}."
+        for p in points
+        if p.get("reason")
+    ]
+    return [line for line in lines if line]
+
+
+def _narrowing(points: Sequence[dict[str, Any]], axis: str, method: str) -> str:
+    own = [p for p in points if p["axis"] == axis and p["method"] == method and "dt_own_s" in p]
+    if len(own) < 2:
+        return ""
+    low, high = min(own, key=lambda p: p["dt_own_s"]), max(own, key=lambda p: p["dt_own_s"])
+    ratio = high["dt_own_s"] / low["dt_own_s"]
+    if ratio < 1.5:
+        return f"{method}: {axis} from {own[0]['value']:g} to {own[-1]['value']:g} leaves the step as it is."
+    return (
+        f"{method}: {axis} narrows the step {ratio:.3g}-fold, from {high['dt_own_s']:.3g} s at {high['value']:g} to "
+        f"{low['dt_own_s']:.3g} s at {low['value']:g} (bound: {low['binding']})."
+    )

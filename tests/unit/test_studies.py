@@ -1,0 +1,146 @@
+"""The rules of the studies: bisection, extrapolation, ranking, verdicts, changes."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fluidbench.cli.app import budget_of, fraction
+from fluidbench.errors import UserError
+from fluidbench.library import load
+from fluidbench.solver import get_solver
+from fluidbench.study.ablate import Change, changes, effect
+from fluidbench.study.case import Finding, cases
+from fluidbench.study.execute import Finished
+from fluidbench.study.limits import bisect, block, block_limit, default_dt
+from fluidbench.study.select import assess, confidence, trust_of
+from fluidbench.study.stability import AXES, choose, measure_point, point_tasks, theory, varied
+from fluidbench.study.validate import Trial
+from fluidbench.study.verdicts import CONFIRMED, REFUTED, at_equal_error, placed, ranked, share_within, winners
+
+
+@pytest.mark.parametrize("limit", [1e-5, 3.3e-3, 0.2])
+def test_bisection_finds_the_limit_from_either_side(limit):
+    for guess in (limit / 5, 5 * limit):
+        found = bisect(lambda dt: dt <= limit, guess, 0.03, 100.0)
+        assert found.stable <= limit <= found.unstable and found.dt == pytest.approx(limit, rel=0.03)
+
+
+def test_bisection_says_when_no_limit_was_reached():
+    assert math.isinf(bisect(lambda _: True, 1.0, 0.1, 8.0).unstable)
+    assert bisect(lambda _: False, 1.0, 0.1, 8.0).stable == 0.0
+
+
+def test_a_block_of_mpm_has_the_limit_of_theory():
+    """1.27 to 1.31 dx / c (validation H), within the 20 % that other features may cost."""
+    solver = get_solver("mpm")
+    config, scenario = solver.Config(), block({"density": 1000.0, "sound_speed": 10.0}, 0.01)
+    own, _ = default_dt(scenario, solver, config)
+    found = block_limit(scenario, solver, config, own, 0.1, "cpu")
+    assert found.dt == pytest.approx(theory("mpm", scenario, config), rel=0.2)
+    assert found.dt * 10.0 / 0.02 == pytest.approx(1.29, rel=0.2)
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_every_axis_makes_valid_points_or_refuses(name):
+    scenario = load("line_bead")
+    tasks = point_tasks(scenario, choose([name]), ["mpm"], True, "cpu")
+    assert tasks
+    for _, task in tasks:
+        try:
+            assert varied(task["scenario"], task["settings"]) is not None
+        except UserError as error:
+            assert str(error)
+
+
+def test_a_point_beyond_its_sound_is_refused_with_the_reason():
+    task = point_tasks(load("line_bead"), choose(["exit_speed"]), ["sph"], True, "cpu")[-1][1]
+    row = measure_point(task)
+    assert row["verdict"] == "refused" and "faster than its own sound" in row["reason"]
+
+
+def record(method, spacing, **measures):
+    cost = {"mean_dt_s": 1e-4, "wall_s": spacing**-4, "wall_per_simulated_s": spacing**-4, "cpu_s": spacing**-4}
+    return Finished(
+        {"verdict": "completed", "method": method, "device": "cpu", "spacing_m": spacing, "measures": measures,
+         "answers": [], "cost": cost}, Path("nowhere"), False,
+    )  # fmt: skip
+
+
+def test_selection_extrapolates_and_knows_the_bias():
+    """Widths of exactly first order: MPM towards 10 mm, PBD towards 12; the known answers trust MPM on paste."""
+    spacings = (1.0, 1.5, 2.0)
+    runs = [record("mpm", d, bead_width_m=0.010 * (1 + 0.02 * d)) for d in spacings]
+    runs += [record("pbd", d, bead_width_m=0.012 * (1 + 0.02 * d)) for d in spacings]
+    chosen = assess(load("line_bead"), ["mpm", "pbd"], runs)
+    assert chosen.trust["mpm"].trusted and not chosen.trust["pbd"].trusted
+    assert chosen.limits["mpm"]["bead_width_m"] == pytest.approx(0.010)
+    errors = {(c.method, c.spacing): c.error for c in chosen.candidates}
+    assert errors["mpm", 1.0] == pytest.approx(0.02) and errors["mpm", 2.0] == pytest.approx(0.04)
+    assert errors["pbd", 1.0] == pytest.approx(0.2 + 1.2 * 0.02)
+    best, why = chosen.recommend(0.035, math.inf, math.inf)
+    assert best is not None and (best.method, best.spacing, why) == ("mpm", 1.5, "")
+    _, why = chosen.recommend(0.001, math.inf, math.inf)
+    assert "nothing tried meets the tolerance" in why
+    assert "only mpm" in confidence(chosen, 0.05)
+
+
+def test_known_answers_cover_every_method_and_class():
+    assert all(t.judged > 1 for t in trust_of(load("line_bead"), ["mpm", "sph", "pbd"]).values())
+
+
+def test_ranking_needs_an_effect_and_distance_beyond_the_spread():
+    places = ranked({"a": [1.0, 1.1], "b": [2.0, 2.1], "c": [8.0, 8.2]})
+    assert [placed(places["a"], "lowest"), placed(places["b"], "middle"), placed(places["c"], "highest")] == [
+        CONFIRMED
+    ] * 3
+    close = ranked({"a": [1.0, 1.0], "b": [1.1, 1.1], "c": [8.0, 8.0]})
+    assert placed(close["a"], "lowest") == REFUTED
+    noisy = ranked({"a": [1.0, 5.0], "b": [3.0, 7.0], "c": [50.0, 51.0]})
+    assert placed(noisy["a"], "lowest") == REFUTED
+
+
+def trial(case, method, error, wall, spacing=1.0):
+    made = Trial(cases()[case], method, "coarse", spacing * cases()[case].spacing)
+    made.finding, made.cost = Finding(error), {"wall_s": wall}
+    return made
+
+
+def test_cost_at_equal_error_follows_the_power_laws():
+    """Errors h and 4 h at the same cost h^-4: at equal error the second costs 4^4 times as much."""
+    trials = [trial("elliptic_drop", m, k * h, h**-4, h) for m, k in (("mpm", 1.0), ("sph", 4.0)) for h in (1.0, 0.5)]
+    costs = at_equal_error(trials)
+    assert costs["sph"] / costs["mpm"] == pytest.approx(256.0)
+
+
+def test_shares_and_winners_leave_out_what_missed():
+    trials = [trial("elliptic_drop", "mpm", 0.001, 2.0), trial("elliptic_drop", "sph", 0.9, 1.0)]
+    assert share_within(trials, "mpm", ["liquid"]) == (1, 1) and share_within(trials, "sph", ["liquid"]) == (0, 1)
+    assert winners(trials, ["liquid"]) == {"mpm": 1}
+
+
+def test_changes_are_what_the_scenario_has():
+    names = [c.name for c in changes(load("line_bead"), ["mpm", "pbd"])]
+    assert "no yield stress" in names and "slip floor" in names and "fewer iterations" in names
+    assert not any("viscosity" in n for n in [c.name for c in changes(load("dam_break"), ["mpm"])])
+
+
+def test_an_effect_names_the_length_that_moved_most():
+    base = record("mpm", 1.0, bead_width_m=0.010, bead_height_m=0.005)
+    moved = record("mpm", 1.0, bead_width_m=0.011, bead_height_m=0.005)
+    seen = effect(Change("x", {}), "mpm", moved, base)
+    assert seen.length == "bead_width_m" and seen.moved == pytest.approx(0.1) and seen.saved == pytest.approx(0.0)
+
+
+def test_options_are_read_or_refused():
+    assert fraction("5%") == pytest.approx(0.05) and fraction("0.1") == pytest.approx(0.1)
+    assert budget_of("60s") == (60.0, math.inf) and budget_of("realtime") == (math.inf, 1.0)
+    assert budget_of("2m")[0] == 120.0 and np.isinf(budget_of("")[0])
+    for wrong in ("five", "-1"):
+        with pytest.raises(UserError, match="takes a"):
+            fraction(wrong)
+        with pytest.raises(UserError, match="takes a"):
+            budget_of(wrong)
+    with pytest.raises(UserError, match="did you mean 'viscosity'"):
+        choose(["viscocity"])
