@@ -14,6 +14,7 @@ import time
 import warp as wp
 
 from fluidbench.body import Body
+from fluidbench.device import quiet_warp
 from fluidbench.material import Material
 from fluidbench.scenario import Domain, Scenario
 from fluidbench.simulation import Simulation
@@ -73,7 +74,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=20)
     parser.add_argument("--warmup", type=int, default=5)
     a = parser.parse_args()
-    wp.config.quiet = True
+    quiet_warp()
     for particles in a.particles:
         print(json.dumps(measure(particles, a.device, a.steps, a.warmup)), flush=True)
 

@@ -6,9 +6,8 @@ python benchmarks/sph_dam.py --particles 20000 --simulated 0.33
 import argparse
 import json
 
-import warp as wp
-
 from fluidbench.body import Body
+from fluidbench.device import quiet_warp
 from fluidbench.material import Material
 from fluidbench.scenario import Domain, Scenario, Walls
 from fluidbench.simulation import Simulation
@@ -36,7 +35,7 @@ def main() -> None:
     parser.add_argument("--depth", type=float, default=0.5, help="metres")
     parser.add_argument("--device", default="cpu")
     a = parser.parse_args()
-    wp.config.quiet = True
+    quiet_warp()
     outcome = Simulation(dam(a.particles, a.simulated, a.depth), "sph", a.device).run()
     print(json.dumps({
         "benchmark": "sph_dam", "device": a.device, "particles": outcome.peak_particles, "verdict": outcome.verdict,

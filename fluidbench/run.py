@@ -94,9 +94,10 @@ def _post_mortem(job: Job, folder: Path, code: int, timed: bool) -> dict[str, An
 def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
     """Run a job in this process; writes the series, the last snapshot and the record into the folder."""
     import pandas as pd
-    import warp as wp
 
-    wp.config.quiet = True
+    from .device import quiet_warp
+
+    quiet_warp()
     from .measure.ledger import final_lengths, ledger, lengths
     from .measure.reference import answers
     from .simulation import Simulation, Verdict

@@ -3,13 +3,12 @@
 from typing import Any
 
 import numpy as np
-import pytest
-import warp as wp
 
+from fluidbench.device import quiet_warp
 from fluidbench.library import validate
 from fluidbench.scenario import Scenario
 
-wp.config.quiet = True
+quiet_warp()
 G = 9.81
 
 
@@ -44,8 +43,3 @@ def bead(**table: Any) -> Scenario:
 def center_of_mass(frame: dict[str, np.ndarray]) -> np.ndarray:
     m = frame["mass"].astype(float)
     return m @ frame["position"].astype(float) / m.sum()
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> None:
-    wp.config.quiet = True

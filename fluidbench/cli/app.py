@@ -41,7 +41,9 @@ def check_device(device: str) -> None:
         return
     import warp as wp
 
-    wp.config.quiet = True
+    from ..device import quiet_warp
+
+    quiet_warp()
     wp.init()
     known = ["cpu", *[d.alias for d in wp.get_cuda_devices()]]
     if device not in known:

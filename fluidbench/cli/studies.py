@@ -70,12 +70,11 @@ def _prepare(
     solvers: str, device: str, out: Path | None, verb: str, jobs: int | None
 ) -> "tuple[list[str], Store, int]":
     """Methods, output folder and number of workers; everything is checked before anything is written."""
-    import warp as wp
-
+    from ..device import quiet_warp
     from ..solver import get_solver, solver_names
     from ..store import Store
 
-    wp.config.quiet = True
+    quiet_warp()
 
     methods = split(solvers) or solver_names()
     for method in methods:

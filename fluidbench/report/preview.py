@@ -82,7 +82,9 @@ def diagnosis() -> list[str]:
 def _devices() -> list[str]:
     import warp as wp
 
-    wp.config.quiet = True
+    from ..device import quiet_warp
+
+    quiet_warp()
     wp.init()
     lines = ["device cpu: available"]
     for device in wp.get_cuda_devices():

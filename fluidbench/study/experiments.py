@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
+from ..device import quiet_warp
 from ..store import Store, write_atomically
 
 Task = dict[str, Any]
@@ -40,17 +41,10 @@ def run_tasks(
     return [result or {} for result in results]
 
 
-def _quiet() -> None:
-    """Keep Warp from announcing itself in every process."""
-    import warp as wp
-
-    wp.config.quiet = True
-
-
 def _round(tasks: Sequence[Task], function: Callable[[Task], dict[str, Any]], workers: int):
     """(index, result) as tasks end. When a process dies, the tasks that it may have been are run one by one."""
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_quiet) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=quiet_warp) as pool:
         futures = {pool.submit(function, task): i for i, task in enumerate(tasks)}
         suspects: list[int] = []
         try:
@@ -63,7 +57,7 @@ def _round(tasks: Sequence[Task], function: Callable[[Task], dict[str, Any]], wo
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     for i in sorted(suspects)[: workers + 1]:
-        with ProcessPoolExecutor(1, mp_context=context, initializer=_quiet) as alone:
+        with ProcessPoolExecutor(1, mp_context=context, initializer=quiet_warp) as alone:
             try:
                 yield i, alone.submit(function, tasks[i]).result()
             except BrokenProcessPool:
