@@ -93,7 +93,8 @@ def gather(
 
     methods = ("mpm", "sph", "pbd")
     planned = [job(m, {}, r) for m in methods for r in range(repeats)]
-    planned += [job("mpm", {"numerics.mpm.grid_ratio": g}) for g in SWEEP_GRID]
+    cell = configure(get_solver("mpm"), scenario).grid_ratio * scenario.spacing
+    planned += [job("mpm", {"numerics.mpm.grid_ratio": g, "spacing": cell / g}) for g in SWEEP_GRID]  # one grid
     planned += [job("pbd", {"numerics.pbd.iterations": n}) for n in SWEEP_ITERATIONS]
     runs = execute(planned, store, hooks)
     found = Evidence(scenario, trials, {})

@@ -50,7 +50,7 @@ class ConfigSPH(Config):
         return self.smoothing_ratio_solid if solid else self.smoothing_ratio
 
 
-FASTEST = 1.0  # Mach number beyond which shocks make matter too dense for its lists
+FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
 
 
 class SolverSPH(Solver):
@@ -72,7 +72,7 @@ class SolverSPH(Solver):
         if speed < FASTEST * c:
             return None
         return (
-            f"it moves at {speed:.3g} m/s, faster than its own sound ({c:.3g} m/s): particles would be pushed "
+            f"it moves at {speed:.3g} m/s, too near its own sound ({c:.3g} m/s): particles would be pushed "
             "through each other; raise material.youngs_modulus, bulk_modulus or sound_speed"
         )
 

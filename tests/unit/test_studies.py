@@ -57,7 +57,7 @@ def test_every_axis_makes_valid_points_or_refuses(name):
 def test_a_point_beyond_its_sound_is_refused_with_the_reason():
     task = point_tasks(load("line_bead"), choose(["exit_speed"]), ["sph"], True, "cpu")[-1][1]
     row = measure_point(task)
-    assert row["verdict"] == "refused" and "faster than its own sound" in row["reason"]
+    assert row["verdict"] == "refused" and "too near its own sound" in row["reason"]
 
 
 def record(method, spacing, **measures):
