@@ -96,8 +96,7 @@ def multipliers(
     if i - world * capacity < count[world]:
         x = position[i]
         # Its own term counts the particle's volume by half: a lattice stretched by a percent then sums as before.
-        lattice = num.spacing * num.spacing * num.spacing
-        dense = 0.5 * (volume[i] + lattice) * summed(0.0, num.support)
+        dense = 0.5 * (volume[i] + num.spacing * num.spacing * num.spacing) * summed(0.0, num.support)
         own = wp.vec3(0.0, 0.0, 0.0)
         squares = float(0.0)
         for k in range(lists.number[i]):
@@ -118,9 +117,7 @@ def multipliers(
         fill[i] = dense
         # One-sided: a surface must not be pulled together. Lengths are scaled by the spacing to make epsilon a number.
         scale = num.spacing * num.spacing
-        limit = 1.0 + SLACK
-        if is_solid(phases[world, phase_of[i]]):
-            limit = 1.0 + SLACK_SOLID
+        limit = 1.0 + wp.where(is_solid(phases[world, phase_of[i]]), SLACK_SOLID, SLACK)
         multiplier[i] = -wp.max(dense - limit, 0.0) / ((squares + wp.dot(own, own)) * scale + num.relaxation)
 
 
