@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..study.table1 import Cell, Evidence, table1
-from ..study.verdicts import RULES
+from ..study.verdicts import OPEN, RULES
 from .study import Report
 from .tables import Table
 from .validation import work_precision
@@ -18,8 +18,8 @@ def report(e: Evidence, root: Path) -> Report:
 
     cells = table1(e)
     counts = Counter(c.verdict for c in cells)
-    findings = [f"{n} {verdict}" for verdict, n in counts.items()]
-    findings += [f"{c.row}, {c.method}: '{c.paper}': {c.verdict}. {c.measured}." for c in cells if c.paper != "-"]
+    findings = ["Verdicts: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()) + "."]
+    findings += [f"{c.row}, {c.method}: '{c.paper}': {c.verdict}. {c.measured}." for c in cells if c.verdict != OPEN]
     by_case: dict[str, list] = {}
     for t in e.trials:
         by_case.setdefault(t.case.name, []).append(t)

@@ -238,15 +238,15 @@ def bound_dt(scenario: Scenario, method: str, settings: dict[str, Any]) -> float
 
 
 def grid_artifacts(e: Evidence) -> Cell:
-    """Bead lengths at one particle a cell against those at eight."""
+    """The bead's area at one particle a cell against eight and more, on one grid."""
     done = {g: lengths_of(r.record) for g, r in e.grids.items() if r.ok}
     word, rule = "grid artifacts", "artifacts"
     if 1.0 not in done or 2.0 not in done or 3.0 not in done:
         return Cell("limits: grid artifacts", "mpm", word, "a run did not complete", "grid ratios", rule, OPEN)
     area = {g: abs(row["bead_area_m2"] / _exact_area(e) - 1.0) for g, row in done.items() if "bead_area_m2" in row}
     measured = ", ".join(f"{g**3:.2g} a cell: area off by {a:.1%}" for g, a in area.items())
-    sparse, usual = area[1.0], area[2.0]
-    verdict = CONFIRMED if sparse > EFFECT * max(usual, 0.01) else REFUTED
+    dense = max(area[2.0], area[3.0])
+    verdict = CONFIRMED if area[1.0] > EFFECT * max(dense, 0.01) else REFUTED
     return Cell("limits: grid artifacts", "mpm", word, measured, "grid ratios", rule, verdict)
 
 
