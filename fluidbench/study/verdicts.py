@@ -28,7 +28,7 @@ RULES = {
     "deviations of the repeats apart",
     "best": "the method that is cheapest, among those within tolerance, on most known answers of the class",
     "collapse": f"the step shrinks at least {COLLAPSE:g}-fold from one end to the other",
-    "artifacts": f"at 1 particle a cell the bead's area is off by {EFFECT:g} times the worse of 8 and 27, and by over 1 %",
+    "artifacts": f"at 1 particle a cell the bead's area is {EFFECT:g} times as far off as at 8 and 27, and over 1 %",
     "prediction": "off by more than the tolerance of the case, or by over 10 % from the mean of the other two methods",
     "definition": "a definition, not a claim",
 }
