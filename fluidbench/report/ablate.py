@@ -41,6 +41,7 @@ def report(scenario: Scenario, name: str, done: Ablation, tolerance: float, root
                 [seen.change.name, seen.method, _percent(seen.moved), seen.length, _percent(seen.saved), word]
             )
     findings = [f"{m}: the scenario itself ended as {r.record['verdict']}." for m, r in done.base.items() if not r.ok]
+    findings += done.impossible
     for method in done.base:
         own = [e for e in done.effects if e.method == method]
         needed = [e.change.name for e in own if verdict(e, tolerance) == "needed"]

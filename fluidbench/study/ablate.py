@@ -46,11 +46,12 @@ class Effect:
 
 @dataclass
 class Ablation:
-    """All effects, and for each method the leanest mix that was confirmed by a run."""
+    """All effects, for each method the leanest mix that was confirmed by a run, and changes that make no scenario."""
 
     base: dict[str, Finished]
     effects: list[Effect] = field(default_factory=list)
     lean: dict[str, Effect] = field(default_factory=dict)
+    impossible: list[str] = field(default_factory=list)
 
 
 def changes(scenario: Scenario, methods: Sequence[str]) -> list[Change]:
@@ -133,14 +134,14 @@ def ablate(
         return Job(changed.model_dump(mode="json"), method, device, wall_limit=wall_limit)
 
     wanted = [(c, m) for c in changes(scenario, methods) for m in methods if c.method in (None, m)]
-    planned = []
+    planned, impossible = [], []
     for change, method in wanted:
         try:
             planned.append((change, method, job(change.settings, method)))
-        except UserError:
-            continue  # a nozzle too fine for the coarser spacing, say: not a change that this scenario allows
+        except UserError as error:  # a nozzle too fine for the coarser spacing, say
+            impossible.append(f"{method}: {change.name}: not possible here: {error}")
     runs = execute([job({}, m) for m in methods] + [j for *_, j in planned], store, hooks, workers)
-    result = Ablation(dict(zip(methods, runs, strict=False)))
+    result = Ablation(dict(zip(methods, runs, strict=False)), impossible=impossible)
     for (change, method, _), run in zip(planned, runs[len(methods) :], strict=True):
         result.effects.append(effect(change, method, run, result.base[method]))
     for method in methods:

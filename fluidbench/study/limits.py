@@ -16,7 +16,7 @@ import numpy as np
 
 from ..body import Body
 from ..scenario import Scenario
-from ..simulation import Simulation
+from ..simulation import SPEED_MARGIN, Simulation
 from ..solver import Solver
 
 GROWTH, STEPS, LOOKS = (
@@ -142,6 +142,6 @@ def lump_survives(scenario: Scenario, method: type[Solver], config: Any, dt: flo
 
 def default_dt(scenario: Scenario, method: type[Solver], config: Any) -> tuple[float, str]:
     """(dt [s], name of the bound) that the method would take for the lump."""
-    bounds = method.bounds(scenario, config, 1.25 * scenario.reference_speed)
+    bounds = method.bounds(scenario, config, SPEED_MARGIN * scenario.reference_speed)
     least = min(bounds, key=lambda b: b.dt)
     return least.dt, least.name

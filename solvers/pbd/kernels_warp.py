@@ -24,8 +24,8 @@ kernel = warp_func(poly6)
 summed = warp_func(spiky)
 gradient = warp_func(spiky_slope)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
-smoothing_weight = warp_func(laws.smoothing_weight)
-conveyed_modulus = warp_func(laws.conveyed_modulus)
+smoothing_weight = warp_func(laws.smoothing_weight, laws.largest_viscosity)
+conveyed_modulus = warp_func(laws.conveyed_modulus, laws.largest_modulus)
 
 SLACK = wp.constant(
     2.0e-3

@@ -1,10 +1,19 @@
 """What position-based dynamics makes of material parameters at a given time step, as plain laws (see bind.py)."""
 
 
+def largest_viscosity(density: float, dt: float, support: float, sweeps: float):
+    """The most that XSPH sweeps can stand for at this dt [Pa s]: rho sweeps H^2 / (22 dt) (validation C)."""
+    return density * sweeps * support * support / (22.0 * dt)
+
+
 def smoothing_weight(viscosity: float, density: float, dt: float, support: float, sweeps: float):
-    """XSPH coefficient of one sweep that acts like a viscosity [Pa s]: c = 22 nu dt / (sweeps H^2), at most 1
-    (validation C)."""
-    return min(22.0 * viscosity / density * dt / (support * support * sweeps), 1.0)
+    """XSPH coefficient of one sweep that acts like a viscosity [Pa s]: its share of the largest, at most 1."""
+    return min(viscosity / largest_viscosity(density, dt, support, sweeps), 1.0)
+
+
+def largest_modulus(share: float, density: float, spacing: float, dt: float):
+    """The most that a substep conveys [Pa]: share rho (d / dt)^2."""
+    return density * share * spacing * spacing / (dt * dt)
 
 
 def conveyed_modulus(modulus: float, share: float, density: float, spacing: float, dt: float):
@@ -13,7 +22,7 @@ def conveyed_modulus(modulus: float, share: float, density: float, spacing: floa
     The XPBD multiplier -C / (S + 1 / (M dt^2)) of a strain constraint C with inverse mass S is that of an elastic
     stress with this modulus: beyond what dt allows a stiffer material does not get stiffer.
     """
-    most = share * density * spacing * spacing / (dt * dt)
+    most = largest_modulus(share, density, spacing, dt)
     return modulus * most / (modulus + most)
 
 

@@ -37,9 +37,9 @@ class ConfigPBD(Config):
 
 
 def largest_viscosity(scenario: Scenario, config: ConfigPBD, dt: float) -> float:
-    """The most that XSPH sweeps can stand for at this dt [Pa s]: rho sweeps H^2 / (22 dt) (validation C)."""
+    """The most viscosity that a scenario's sweeps can stand for at this dt [Pa s]."""
     support = config.support_ratio * scenario.spacing
-    return scenario.material.density * config.shear_sweeps * support**2 / (22.0 * dt)
+    return laws.largest_viscosity(scenario.material.density, dt, support, config.shear_sweeps)
 
 
 STIFFEST = 0.5  # kappa in c_eff = kappa (d / dt) sqrt(sweeps), Jacobi (validation I)
@@ -72,7 +72,7 @@ class SolverPBD(Solver):
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
         m, dt = scenario.material, cls.usual_dt(scenario, config)
-        most = config.shear_stiffness * m.density * (scenario.spacing / dt) ** 2
+        most = laws.largest_modulus(config.shear_stiffness, m.density, scenario.spacing, dt)
         if m.youngs_modulus is None or m.is_solid or m.flow_threshold < most or m.relaxation_time is not None:
             return None
         finer = 0.5 * config.advance * math.sqrt(most / m.flow_threshold)
