@@ -101,7 +101,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     from .measure.ledger import final_lengths, ledger, lengths
     from .measure.reference import answers
     from .simulation import Simulation, Verdict
-    from .solver import get_solver
+    from .solver import approximations, get_solver
 
     scenario = Scenario.model_validate(job.scenario)
     solver = get_solver(job.method)
@@ -134,7 +134,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         "cost": cost(outcome, simulation, time.perf_counter() - start),
         "bounds_s": {b.name: b.dt for b in simulation.bounds()},
         "binding_s": outcome.binding,
-        "approximations": solver.approximates(scenario, simulation.config),
+        "approximations": approximations(solver, scenario, simulation.config),
         "warnings": scenario.warnings(),
         "config": simulation.config.model_dump(), "input": scenario.model_dump(mode="json"),
         "machine": machine(job.device),

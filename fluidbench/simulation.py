@@ -18,7 +18,7 @@ from .process import emission
 from .process.emission import Emission
 from .scenario import Scenario
 from .scene import Scene
-from .solver import Solver, configure, get_solver
+from .solver import Solver, configure, get_solver, refusal
 from .timestep import Bound, Plan, plan
 
 SORT_TICKS = 32  # ticks between reorderings of the pool, at most
@@ -68,7 +68,7 @@ class Simulation:
         self.scenario = self.scene.scenario
         self.config = configure(solver_class, self.scenario) if config is None else config
         for scenario in self.scene.scenarios:
-            if reason := solver_class.refuses(scenario, self.config):
+            if reason := refusal(solver_class, scenario, self.config):
                 raise UserError(f"{solver_class.name} cannot run {scenario.name}: {reason}")
         self.pool = Pool(self.scene, capacity_of(self.scenario))
         for body in self.scenario.bodies:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from .errors import UserError, suggestion
+from .timestep import lost_speed
 
 if TYPE_CHECKING:
     from .particles import Pool
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .timestep import Bound
 
+LOST = 0.1  # share of a scenario's own speed that single precision may lose
 ENTRY_POINTS = "fluidbench.solvers"
 
 
@@ -115,6 +117,30 @@ def get_solver(name: str) -> type[Solver]:
     for point in entry_points(group=ENTRY_POINTS, name=name):
         return point.load()
     raise UserError(f"no solver named '{name}'{suggestion(name, solver_names())}")
+
+
+def refusal(solver: type[Solver], scenario: Scenario, config: Any) -> str | None:
+    """Why a method cannot run a scenario, for reasons of its own or for want of precision; None when it can."""
+    lost, binding = _lost(solver, scenario, config)
+    if lost > LOST * scenario.reference_speed:
+        return (
+            f"its step of {binding.dt:.2g} s (bound '{binding.name}') is too small for single precision: motion slower "
+            f"than {lost:.2g} m/s would stand still; soften what binds it, or use a larger spacing"
+        )
+    return solver.refuses(scenario, config)
+
+
+def approximations(solver: type[Solver], scenario: Scenario, config: Any) -> list[str]:
+    """What a method only approximates in a scenario, and the motion that its steps are too small to resolve."""
+    lost, _ = _lost(solver, scenario, config)
+    slow = [f"motion slower than {lost:.2g} m/s is lost in single precision at this time step"]
+    return solver.approximates(scenario, config) + (slow if lost > 0.01 * scenario.reference_speed else [])
+
+
+def _lost(solver: type[Solver], scenario: Scenario, config: Any) -> tuple[float, Bound]:
+    binding = min(solver.bounds(scenario, config, scenario.reference_speed), key=lambda bound: bound.dt)
+    domain = scenario.domain
+    return lost_speed(binding.dt, max(map(abs, (*domain.lower, *domain.upper)))), binding
 
 
 def configure(solver: type[Solver], scenario: Scenario) -> Any:

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -34,6 +36,12 @@ def plan(bounds: Sequence[Bound], tick: float) -> Plan:
         raise ValueError(f"bound '{binding.name}' is {binding.dt}, which allows no step")
     substeps = max(1, math.ceil(tick / binding.dt * (1.0 - 1e-9)))
     return Plan(tick / substeps, substeps, binding)
+
+
+def lost_speed(dt: float, reach: float) -> float:
+    """Motion slower than this [m/s] is lost in single precision: a position of size `reach` [m] does not change when
+    v dt is below half a unit in its last place."""
+    return 0.5 * float(np.spacing(np.float32(reach))) / dt
 
 
 def damped_limit(acoustic: float, viscous: float) -> float:

@@ -201,14 +201,14 @@ def table1(
     A second call reuses the runs that are finished.
     """
     from ..report.table1 import report
+    from ..study.evidence import METHODS, chosen_cases, gather, levels_of, planned, shipped
     from ..study.execute import Hooks
-    from ..study.table1 import chosen_cases, gather, levels_of
     from ..study.validate import plan, run
 
     coarser = 4 / 3 if quick and spacing is None else 1.0
     resolved = load_scenario(scenario, set_, spacing)
     resolved = load_scenario(scenario, set_, coarser * resolved.spacing)
-    methods, store, workers = _prepare("mpm,sph,pbd", device, out, "table1", jobs)
+    methods, store, workers = _prepare(",".join(METHODS), device, out, "table1", jobs)
     trials = [
         trial for case in chosen_cases(quick)
         for trial in plan([case], methods, levels_of(case, quick), False, device, wall_limit)
@@ -216,7 +216,8 @@ def table1(
     with _watch("known answers", len(trials)) as tell:
         none = lambda *_: None  # noqa: E731
         run(trials, store, workers, none, none, none, lambda t: tell(f"{t.case.name} {t.method} {t.verdict}"))
-    with _watch("the scenario", 3 * repeats + 8) as tell:
+    trials += shipped() if quick else []
+    with _watch("the scenario", planned(repeats)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        evidence = gather(resolved, trials, repeats, store, hooks, device, wall_limit)
+        evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, device, wall_limit)
     _publish(report(evidence, store.root), store.root)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..scenario import Scenario
 from ..study.ablate import WORTH, Ablation, Effect, command
-from .study import Report
+from .study import Report, record_link
 from .tables import Table
 from .traces import Plot, Trace, colour
 
@@ -61,8 +61,8 @@ def report(scenario: Scenario, name: str, done: Ablation, tolerance: float, root
         if seen:
             xs, ys = [100 * e.saved for e in seen], [100 * e.moved for e in seen]
             plot.traces.append(Trace(method, xs, ys, "points", colour(method)))
-    runs = [(f"{e.method}: {e.change.name}", f"{e.run.folder.relative_to(root).as_posix()}/record.json")
-            for e in [*done.effects, *done.lean.values()]]  # fmt: skip
+    runs = {"every change": [record_link(e.run, root, f"{e.method}: {e.change.name}")
+                             for e in [*done.effects, *done.lean.values()]]}  # fmt: skip
     return Report(
         "ablate", f"fluidbench ablate: {scenario.name}", "What it requires, and what it pays for without need.",
         findings, [table], pd.DataFrame(rows), [plot], runs,

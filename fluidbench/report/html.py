@@ -37,7 +37,9 @@ code { background: #f3f3f3; padding: 0 .25rem; } li { margin: .2rem 0; }
 """
 ROWS = """{% macro rows(table) %}<table><thead><tr>
 {%- for cell in table.head %}<th>{{ cell }}</th>{% endfor %}</tr></thead><tbody>
-{% for row in table.rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
+{% for row in table.rows %}<tr>{% for cell in row %}<td>{% if cell.href %}<a href="{{ cell.href }}">{{ cell }}</a>
+{%- else %}{{ cell }}{% endif %}</td>
+{%- endfor %}</tr>{% endfor %}</tbody></table>
 {%- endmacro %}"""
 COMPARE = """{% extends "base" %}{% block body %}<p>{{ subtitle }}</p>
 {% for table in tables %}<h2>{{ table.title }}</h2>

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..scenario import Scenario
 from ..study.select import Candidate, Selection, confidence, physics_of
-from .study import Report
+from .study import Report, record_link
 from .tables import Table, number
 from .traces import Plot, Trace, colour
 
@@ -22,8 +22,7 @@ def report(
 
     front = chosen.front()
     rows = [_row(c, c in front) for c in chosen.candidates]
-    runs = [(f"{r.label} d = {r.record.get('spacing_m', 0):g}", f"{r.folder.relative_to(root).as_posix()}/record.json")
-            for r in chosen.runs]  # fmt: skip
+    runs = {"every method at every spacing": [record_link(r, root) for r in chosen.runs]}
     machine = next((r.record["machine"] for r in chosen.runs if "machine" in r.record), {})
     return Report(
         "select", f"fluidbench select: {scenario.name}",

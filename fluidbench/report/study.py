@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..store import write_atomically
+from ..study.execute import Finished
 from .html import environment, plotly_html, script
 from .tables import Table, show
 from .traces import Plot
@@ -23,15 +25,21 @@ PAGE = """{% extends "base" %}{% block body %}<p>{{ subtitle }}</p>
 {% if table.note %}<p>{{ table.note }}</p>{% endif %}{% endfor %}
 {% if plots %}<h2>Plots</h2>
 <div class="grid">{% for plot in plots %}<div>{{ plot }}</div>{% endfor %}</div>{% endif %}
-{% if runs %}<h2>Runs</h2><ul>
-{% for label, path in runs %}<li id="{{ label }}"><a href="{{ path }}">{{ label }}</a></li>{% endfor %}</ul>{% endif %}
+{% if runs %}<h2>Runs</h2>
+{% for name, links in runs.items() %}<details{% if runs|length == 1 %} open{% endif %}><summary>{{ name }}</summary>
+<ul id="{{ anchor(name) }}">
+{% for label, path in links %}<li><a href="{{ path }}">{{ label }}</a></li>{% endfor %}</ul></details>
+{% endfor %}{% endif %}
 <p>{{ machine }}</p>{% endblock %}
 """
 
 
+Runs = dict[str, list[tuple[str, str]]]
+
+
 @dataclass
 class Report:
-    """What a study found; `data` holds one row an experiment, `runs` the records behind it (label, path)."""
+    """What a study found; `data` holds one row an experiment, `runs` the records behind it by heading."""
 
     verb: str
     title: str
@@ -40,8 +48,23 @@ class Report:
     tables: list[Table]
     data: pd.DataFrame
     plots: list[Plot] = field(default_factory=list)
-    runs: list[tuple[str, str]] = field(default_factory=list)
+    runs: Runs = field(default_factory=dict)
     machine: str = ""
+
+
+def anchor(name: str) -> str:
+    """A heading as an address within the page."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+
+
+def record_link(run: Finished, root: Path, label: str = "") -> tuple[str, str]:
+    """(label, path) of a run's record."""
+    record = run.record
+    label = (
+        label
+        or f"{record['scenario']}, {run.label}, d = {1e3 * record.get('spacing_m', 0):.3g} mm: {record['verdict']}"
+    )
+    return label, f"{run.folder.relative_to(root).as_posix()}/record.json"
 
 
 def publish(report: Report, root: Path, console: Console) -> Path:
@@ -61,7 +84,8 @@ def publish(report: Report, root: Path, console: Console) -> Path:
         draw(plot, root)
     page = environment({"page": PAGE}).get_template("page").render(
         title=report.title, subtitle=report.subtitle, findings=report.findings, tables=report.tables, script=script(),
-        plots=[Markup(plotly_html(plot)) for plot in report.plots], runs=report.runs, machine=report.machine,
+        plots=[Markup(plotly_html(plot)) for plot in report.plots], runs=report.runs, anchor=anchor,
+        machine=report.machine,
     )  # fmt: skip
     write_atomically(root / "report.html", page)
     for table in report.tables:

@@ -14,6 +14,17 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+class Link(str):
+    """A cell that leads somewhere on the page."""
+
+    def __new__(cls, text: str, href: str) -> Link:
+        made = super().__new__(cls, text)
+        made.href = href
+        return made
+
+    href: str
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows of formatted cells under a head; the first column names the row."""

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..layout import capacity_of
 from ..scenario import Scenario
-from ..solver import Solver, configure
+from ..solver import Solver, approximations, configure, refusal
 from ..timestep import Bound, Plan, plan
 
 
@@ -35,8 +35,8 @@ def estimate(scenario: Scenario, solver: type[Solver]) -> Estimate:
     mean = particles * (1.0 - 0.5 * filling)
     return Estimate(
         method=solver.name,
-        refusal=solver.refuses(scenario, config),
-        approximations=solver.approximates(scenario, config),
+        refusal=refusal(solver, scenario, config),
+        approximations=approximations(solver, scenario, config),
         bounds=bounds,
         plan=steps,
         particles=particles,

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..run import Job, launch
 from ..scenario import Scenario
-from ..solver import configure, get_solver
+from ..solver import configure, get_solver, refusal
 from ..store import Store, write_atomically
 
 ADVICE = {
@@ -77,7 +77,7 @@ def _refused(job: Job, folder: Path) -> dict[str, Any] | None:
     """The record of a method that will not run the scenario."""
     scenario = Scenario.model_validate(job.scenario)
     solver = get_solver(job.method)
-    reason = solver.refuses(scenario, configure(solver, scenario))
+    reason = refusal(solver, scenario, configure(solver, scenario))
     if reason is None:
         return None
     record = {

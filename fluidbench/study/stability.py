@@ -13,7 +13,7 @@ from ..errors import UserError, suggestion
 from ..library import validate
 from ..measure.reference import table as reference
 from ..scenario import Scenario
-from ..solver import configure, get_solver
+from ..solver import configure, get_solver, refusal
 from ..timestep import damped_limit
 from .experiments import Task
 
@@ -96,11 +96,11 @@ def measure_point(task: Task) -> dict[str, Any]:
     try:
         scenario = varied(task["scenario"], task["settings"])
         config = configure(solver, scenario)
-        refusal = solver.refuses(scenario, config)
+        reason = refusal(solver, scenario, config)
     except UserError as error:
         return row | {"verdict": REFUSED, "reason": str(error).splitlines()[0]}
-    if refusal is not None:
-        return row | {"verdict": REFUSED, "reason": refusal}
+    if reason is not None:
+        return row | {"verdict": REFUSED, "reason": reason}
     device, precision = task["device"], 0.2 if task["quick"] else 0.05
     own, binding = default_dt(scenario, solver, config)
     trouble = lump_survives(scenario, solver, config, own, device)

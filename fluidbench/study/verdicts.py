@@ -17,19 +17,25 @@ CONFIRMED, REFUTED, OPEN = "confirmed", "refuted", "not decidable"
 EFFECT = 1.2  # two figures that differ by less than this factor count as equal
 GOOD, POOR = 0.75, 0.5  # share of known answers within tolerance that is high fidelity, or low
 FEWEST = 2  # known answers that a verdict on a class needs
+APART = 0.1  # relative difference of two lengths that counts as disagreement
 COLLAPSE = 10.0  # factor by which a step must shrink to count as collapsed
 JUDGED = ("coarse", "quick")  # levels at which a known answer counts
 
 RULES = {
     "fidelity": f"high or good: at least {GOOD:.0%} of the known answers of the class within tolerance; not accurate: "
     f"at most {POOR:.0%}; a class needs {FEWEST} of them",
-    "step": f"methods ordered by their mean default dt on the scenario; a place needs a factor of {EFFECT:g}",
+    "step": f"methods ordered by the largest dt over d/c that a thrown lump survives, at two spacings; a place needs a "
+    f"factor of {EFFECT:g} and two standard deviations",
+    "equal error": f"ordered by the time to reach the error that all three reach, a factor of {EFFECT:g} apart, on "
+    f"most of at least {FEWEST} cases",
     "cost": f"methods ordered by the figure; a place needs a factor of {EFFECT:g}, and means more than two standard "
     "deviations of the repeats apart",
     "best": "the method that is cheapest, among those within tolerance, on most known answers of the class",
     "collapse": f"the step shrinks at least {COLLAPSE:g}-fold from one end to the other",
-    "artifacts": f"at 1 particle a cell the bead's area is {EFFECT:g} times as far off as at 8 and 27, and over 1 %",
-    "prediction": "off by more than the tolerance of the case, or by over 10 % from the mean of the other two methods",
+    "artifacts": f"at 1 particle a cell the bead's area is {EFFECT:g} times as far off as at 8 and 27, and over 1 %, "
+    "on both of two grids",
+    "prediction": f"most of at least {FEWEST} known answers missed; for the bead's width, over {APART:.0%} from the "
+    "mean of the other two methods (which must agree as well) at both of two spacings",
     "definition": "a definition, not a claim",
 }
 
@@ -57,6 +63,11 @@ def ranked(figures: dict[str, list[float]]) -> dict[str, tuple[int, int]]:
     }
 
 
+def agreed(verdicts: Sequence[str]) -> str:
+    """The verdict that every resolution gives; not decidable where they disagree."""
+    return verdicts[0] if len(set(verdicts)) == 1 else OPEN
+
+
 def placed(place: tuple[int, int], word: str) -> str:
     """Whether a place among three is the lowest, the highest or between, as the word says."""
     below, above = place
@@ -66,19 +77,25 @@ def placed(place: tuple[int, int], word: str) -> str:
 
 
 def at_equal_error(trials: Sequence[Trial]) -> dict[str, float]:
-    """Wall time [s] of each method at the error that the worst of them reaches at its best, by power-law fits through
-    its spacings; methods whose error does not fall with cost are left out."""
+    """Wall time [s] of each method at the error that the worst of them reaches at its best: by a power law through its
+    spacings, or, where its error does not fall with cost, its cheapest run within that error."""
     points = {}
     for m in dict.fromkeys(t.method for t in trials):
         own = [(t.error, t.cost["wall_s"]) for t in trials if t.method == m and t.finding is not None and t.error > 0]
         if len(own) >= 2:
             points[m] = np.log(np.array(own))
-    fits = {m: np.polyfit(p[:, 0], p[:, 1], 1) for m, p in points.items()}
-    fits = {m: fit for m, fit in fits.items() if fit[0] < 0}
-    if len(fits) < 2:
+    if len(points) < 2:
         return {}
-    target = max(points[m][:, 0].min() for m in fits)
-    return {m: float(np.exp(np.polyval(fit, target))) for m, fit in fits.items()}
+    target = max(p[:, 0].min() for p in points.values())
+    return {m: math.exp(_cost_at(target, p)) for m, p in points.items()}
+
+
+def _cost_at(target: float, points: np.ndarray) -> float:
+    """log(cost) at log(error) = target from rows (log error, log cost)."""
+    fit = np.polyfit(points[:, 0], points[:, 1], 1)
+    if fit[0] < 0:
+        return float(np.polyval(fit, target))
+    return float(points[points[:, 0] <= target + 1e-9, 1].min())
 
 
 def winners(trials: Sequence[Trial], physics: Sequence[str]) -> dict[str, int]:

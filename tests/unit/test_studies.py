@@ -9,7 +9,7 @@ import pytest
 from fluidbench.cli.app import budget_of, fraction
 from fluidbench.errors import UserError
 from fluidbench.library import load
-from fluidbench.solver import get_solver
+from fluidbench.solver import approximations, configure, get_solver, refusal
 from fluidbench.study.ablate import Change, changes, effect
 from fluidbench.study.case import Finding, cases
 from fluidbench.study.execute import Finished
@@ -17,7 +17,18 @@ from fluidbench.study.limits import bisect, block, block_limit, default_dt
 from fluidbench.study.select import assess, confidence, trust_of
 from fluidbench.study.stability import AXES, choose, measure_point, point_tasks, theory, varied
 from fluidbench.study.validate import Trial
-from fluidbench.study.verdicts import CONFIRMED, REFUTED, at_equal_error, placed, ranked, share_within, winners
+from fluidbench.study.verdicts import (
+    CONFIRMED,
+    OPEN,
+    REFUTED,
+    agreed,
+    at_equal_error,
+    placed,
+    ranked,
+    share_within,
+    winners,
+)
+from fluidbench.timestep import lost_speed
 
 
 @pytest.mark.parametrize("limit", [1e-5, 3.3e-3, 0.2])
@@ -112,6 +123,28 @@ def test_cost_at_equal_error_follows_the_power_laws():
     trials = [trial("elliptic_drop", m, k * h, h**-4, h) for m, k in (("mpm", 1.0), ("sph", 4.0)) for h in (1.0, 0.5)]
     costs = at_equal_error(trials)
     assert costs["sph"] / costs["mpm"] == pytest.approx(256.0)
+
+
+def test_a_method_whose_error_does_not_fall_counts_with_its_cheapest_run():
+    trials = [trial("elliptic_drop", "mpm", h, h**-4, h) for h in (1.0, 0.5)]
+    trials += [trial("elliptic_drop", "pbd", e, w, h) for e, w, h in ((0.6, 1.0, 1.0), (0.7, 9.0, 0.5))]
+    costs = at_equal_error(trials)
+    assert costs["pbd"] == pytest.approx(1.0) and costs["mpm"] == pytest.approx(0.6**-4)
+
+
+def test_resolutions_that_disagree_leave_a_verdict_open():
+    assert agreed([CONFIRMED, CONFIRMED]) == CONFIRMED and agreed([CONFIRMED, REFUTED]) == OPEN
+
+
+def test_a_step_too_small_for_single_precision_is_refused():
+    """At dt = 1e-8 s a particle 0.1 m from the origin must move at 0.4 m/s to move at all."""
+    assert lost_speed(1e-8, 0.1) == pytest.approx(0.5 * 2.0**-27 / 1e-8)
+    solver, scenario = get_solver("mpm"), load("line_bead", ["material.viscosity=1e6"])
+    reason = refusal(solver, scenario, configure(solver, scenario))
+    assert reason is not None and "single precision" in reason and "viscous" in reason
+    sane = load("line_bead")
+    assert refusal(solver, sane, configure(solver, sane)) is None
+    assert not approximations(solver, sane, configure(solver, sane))
 
 
 def test_shares_and_winners_leave_out_what_missed():

@@ -1,0 +1,106 @@
+"""What `table1` rests on: known answers, the scenario through every method, sweeps at two resolutions, step limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..measure.reference import table as reference
+from ..run import Job
+from ..scenario import Scenario
+from ..solver import configure, get_solver
+from ..store import Store
+from .case import Case, Finding, cases
+from .execute import Finished, Hooks, execute
+from .experiments import run_tasks
+from .stability import Spacing, measure_point, point_tasks, varied
+from .validate import Trial
+
+METHODS = ("mpm", "sph", "pbd")
+GRID_RATIOS, ITERATIONS, ADVANCES = (1.0, 1.5, 2.0, 3.0), (1, 2, 5, 10), (0.0625, 0.125, 0.25, 0.5)
+SECOND = 4 / 3  # the second resolution of every sweep, over the first: no verdict may hang on one
+LIMITS = Spacing("spacing", (0.5, 1.0), (0.5, 1.0), "of the scenario's")  # where the largest stable step is measured
+COST_CASES = ("dam_break", "elliptic_drop", "bead_area")  # cases that all methods can run, at several spacings
+DEAR = (
+    "slump_cylinder", "collapse_threshold", "oldroyd_drop_impact", "point_source_current", "viscous_column_slip",
+    "self_weight_column", "bead_strand_shape", "slump_slip", "cantilever_sag", "rigid_rotation",
+)  # fmt: skip
+"""Cases that a quick study does not run: it takes their answers from the shipped table."""
+SHIPPED = "from the shipped table of known answers"
+
+
+@dataclass
+class Evidence:
+    """All that the verdicts rest on. Sweeps: setting -> a run at each resolution."""
+
+    scenario: Scenario
+    trials: list[Trial]
+    repeats: dict[str, list[Finished]]  # the scenario through each method, repeated
+    second: dict[str, Finished] = field(default_factory=dict)  # the same at the second resolution
+    grids: dict[float, list[Finished]] = field(default_factory=dict)
+    iterations: dict[float, list[Finished]] = field(default_factory=dict)
+    advances: dict[float, list[Finished]] = field(default_factory=dict)
+    limits: dict[str, list[dict[str, Any]]] = field(default_factory=dict)  # measured points of `stability`
+
+
+def chosen_cases(quick: bool) -> list[Case]:
+    """The known answers to be run: all, or the cheap ones."""
+    return [c for c in cases().values() if not quick or c.name not in DEAR]
+
+
+def levels_of(case: Case, quick: bool) -> tuple[str, ...]:
+    """The spacings at which a case is run: several where cost is compared at equal error."""
+    if case.name not in COST_CASES:
+        return ("coarse",)
+    return ("rough", "coarse") if quick else ("rough", "coarse", "medium")
+
+
+def shipped() -> list[Trial]:
+    """The dear known answers, as `validate` found them when the shipped table was made."""
+    known, found = cases(), []
+    for row in reference("known_answers").to_dict("records"):
+        if row["case"] in DEAR and row["method"] in METHODS and row["verdict"] != "skipped":
+            finding = None if row["error"] != row["error"] else Finding(row["error"])
+            cost = {key: row[key] for key in ("particles", "wall_s", "wall_per_simulated_s")}
+            found.append(Trial(known[row["case"]], row["method"], "coarse", row["spacing_m"], {}, row["verdict"],
+                               SHIPPED, finding, cost))  # fmt: skip
+    return found
+
+
+def gather(
+    scenario: Scenario, trials: list[Trial], repeats: int, quick: bool, store: Store, hooks: Hooks, workers: int,
+    device: str, wall_limit: float,
+) -> Evidence:  # fmt: skip
+    """The runs on the scenario itself, one at a time so that times mean something; known answers come finished."""
+    table = scenario.model_dump(mode="json")
+
+    def runs(method: str, settings: Sequence[dict[str, Any]], repeat: Sequence[int] = (0,)) -> list[Finished]:
+        jobs = [
+            Job(varied(table, s).model_dump(mode="json"), method, device, repeat=r, wall_limit=wall_limit)
+            for s in settings for r in repeat
+        ]  # fmt: skip
+        return execute(jobs, store, hooks)
+
+    def sweep(method: str, values: Sequence[float], setting: Callable[[float, float], dict[str, Any]]):
+        return {v: runs(method, [setting(v, 1.0), setting(v, SECOND)]) for v in values}
+
+    found = Evidence(scenario, trials, {m: runs(m, [{}], range(repeats)) for m in METHODS})
+    found.second = {m: runs(m, [{"spacing": SECOND * scenario.spacing}])[0] for m in METHODS}
+    cell = configure(get_solver("mpm"), scenario).grid_ratio * scenario.spacing
+    found.grids = sweep("mpm", GRID_RATIOS, lambda g, f: {"numerics.mpm.grid_ratio": g, "spacing": f * cell / g})
+    found.iterations = sweep("pbd", ITERATIONS, lambda n, f: _pbd("iterations", n, f * scenario.spacing))
+    found.advances = sweep("pbd", ADVANCES, lambda a, f: _pbd("advance", a, f * scenario.spacing))
+    tasks = point_tasks(scenario, {"spacing": LIMITS}, METHODS, quick, device)
+    rows = run_tasks(tasks, measure_point, store, workers, lambda *_: None)
+    found.limits = {m: [r for r in rows if r.get("method") == m] for m in METHODS}
+    return found
+
+
+def _pbd(key: str, value: float, spacing: float) -> dict[str, Any]:
+    return {f"numerics.pbd.{key}": value, "spacing": spacing}
+
+
+def planned(repeats: int) -> int:
+    """How many runs on the scenario `gather` makes."""
+    return len(METHODS) * (repeats + 1) + 2 * (len(GRID_RATIOS) + len(ITERATIONS) + len(ADVANCES))
