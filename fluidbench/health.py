@@ -62,7 +62,7 @@ class Health:
 
     def __init__(self, scene: Scene, pool: Pool) -> None:
         self.scene, self.pool = scene, pool
-        self.limit = SPEED_FACTOR * (scene.wave_speed + scene.scenario.reference_speed)
+        self.limit = SPEED_FACTOR * (scene.top_wave_speed + scene.scenario.reference_speed)
         self.lanes = min(scene.lanes, 4096)
         with wp.ScopedDevice(scene.device):
             self.top_speed = wp.zeros(pool.worlds, dtype=float)
@@ -74,7 +74,9 @@ class Health:
         s = self.scene.scenario
         size = np.abs(np.asarray(s.domain.upper) - np.asarray(s.domain.lower))
         reach = size @ np.abs(s.acceleration) + size @ np.abs(s.gradient) @ size
-        return 0.5 * s.reference_speed**2 + float(reach)
+        crowded = s.material.expansion is not None and s.material.expansion.kind == "spawn"
+        pressed = 0.05 * self.scene.top_wave_speed**2 if crowded else 0.0  # spawned children lie over each other
+        return 0.5 * s.reference_speed**2 + float(reach) + pressed
 
     def read(self) -> Vital:
         """Inspect all worlds; synchronises with the device."""

@@ -1,8 +1,11 @@
 """Bodies laid out as particles, on the host."""
 
+import math
+
 import numpy as np
 
 from .body import Body
+from .errors import UserError
 from .process.stream import Stream
 from .scenario import Scenario
 
@@ -33,7 +36,31 @@ def sample(body: Body, scenario: Scenario) -> tuple[np.ndarray, float]:
     return points[scenario.domain.contains(points)], volume
 
 
+def sources(scenario: Scenario) -> list[tuple[int, float]]:
+    """(particles, rest volume of each [m^3]) of every body and of the nozzle's stream, without offspring."""
+    found = [(len(points), volume) for points, volume in (sample(body, scenario) for body in scenario.bodies)]
+    if scenario.nozzle is not None:
+        stream = Stream(scenario)
+        found.append((stream.particles, stream.volume))
+    return found
+
+
+def emitted(scenario: Scenario) -> int:
+    """Particles that a scenario brings in, without offspring."""
+    return sum(count for count, _ in sources(scenario))
+
+
 def capacity_of(scenario: Scenario) -> int:
-    """Particles that a scenario will ever hold."""
-    bodies = sum(len(sample(body, scenario)[0]) for body in scenario.bodies)
-    return bodies + (Stream(scenario).particles if scenario.nozzle is not None else 0)
+    """Particles to preallocate: the scenario's `pool`, or what it will ever hold (six standard deviations above the
+    mean where offspring come by chance).
+
+    Raises UserError when `pool` is smaller than that.
+    """
+    need, model = emitted(scenario), scenario.material.expansion
+    if model is not None:
+        expected = sum(count * model.offspring(volume / scenario.spacing**3) for count, volume in sources(scenario))
+        certain = model.kind == "growth" or model.per_pass == int(model.per_pass)
+        need = math.ceil(expected if certain else expected + 6.0 * model.ratio * math.sqrt(need))
+    if scenario.pool is not None and scenario.pool < need:
+        raise UserError(f"pool = {scenario.pool} is too small: {scenario.name} will hold up to {need} particles")
+    return scenario.pool or need

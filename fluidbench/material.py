@@ -1,12 +1,15 @@
 """What a material is made of: validated input in SI units and the moduli derived from it."""
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+from .cure import Cure, NonNegative, Positive
+from .expansion import Expansion
+
+__all__ = ["Material", "NonNegative", "Positive"]
 
 
 class Material(BaseModel):
@@ -29,6 +32,8 @@ class Material(BaseModel):
     sound_speed: Positive | None = Field(None, description="sqrt(K/rho) [m/s]; overrides K from E and nu")
     bulk_modulus: Positive | None = Field(None, description="bulk modulus K [Pa]; overrides K from E and nu")
     equation_of_state: Literal["linear", "tait"] = Field("linear", description="pressure law; Tait has gamma = 7")
+    cure: Cure | None = Field(None, description="how it cures after it left the nozzle")
+    expansion: Expansion | None = Field(None, description="how it expands after it left the nozzle")
 
     @model_validator(mode="after")
     def _consistent(self) -> "Material":
@@ -40,7 +45,54 @@ class Material(BaseModel):
             raise ValueError("relaxation_time makes an Oldroyd-B liquid: leave out yield_stress and plastic_viscosity")
         if self.plastic_viscosity > 0 and self.yield_stress is None:
             raise ValueError("plastic_viscosity needs yield_stress (0 for a Maxwell liquid, or use viscosity)")
+        if self.cure is not None:
+            self._check_cure(self.cure)
         return self
+
+    def _check_cure(self, cure: Cure) -> None:
+        if self.relaxation_time is not None:
+            raise ValueError("cure: an Oldroyd-B liquid (relaxation_time) cannot cure; use yield_stress instead")
+        if self.expansion is not None and cure.delay < self.expansion.delay:
+            raise ValueError(
+                f"cure.delay = {cure.delay} comes before expansion.delay = {self.expansion.delay}: cured foam cannot "
+                "expand; let it expand first"
+            )
+        if self.youngs_modulus is None and cure.youngs_modulus is None and cure.yield_stress is not None:
+            raise ValueError("cure.yield_stress needs a youngs_modulus, fresh or cured")
+        volumetric = self.bulk_modulus is not None or self.sound_speed is not None
+        if self.youngs_modulus is None and cure.youngs_modulus is not None and not volumetric:
+            raise ValueError("a liquid that cures to a solid needs bulk_modulus or sound_speed, the same for both")
+
+    @property
+    def elastic(self) -> bool:
+        """Whether it has shear stiffness at any age."""
+        return self.youngs_modulus is not None or (self.cure is not None and self.cure.youngs_modulus is not None)
+
+    @property
+    def changes(self) -> bool:
+        """Whether it cures or expands."""
+        return self.cure is not None or self.expansion is not None
+
+    def at(self, degree: float = 0.0, volume_ratio: float = 1.0) -> "Material":
+        """The material at a degree of cure and a volume ratio."""
+        update: dict[str, float] = {"density": self.density / volume_ratio}
+        if self.cure is not None and degree > 0:
+            update |= self.cure.parameters(self.model_dump(), degree)
+        return self.model_copy(update=update)
+
+    def levels(self) -> list["Material"]:
+        """The material at every level of cure, the fresh one first: the rows of the phase table."""
+        count = self.cure.levels if self.cure is not None else 0
+        return [self.at(k / count if k else 0.0) for k in range(count + 1)]
+
+    def by_age(self, ages: Sequence[float]) -> list["Material"]:
+        """The material at these ages [s], jitter taken as early."""
+        found = []
+        for age in ages:
+            degree = self.cure.degree(age + self.cure.jitter) if self.cure is not None else 0.0
+            ratio = self.expansion.volume_ratio(age + self.expansion.jitter) if self.expansion is not None else 1.0
+            found.append(self.at(degree, ratio))
+        return found
 
     @property
     def shear_modulus(self) -> float:

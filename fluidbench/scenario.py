@@ -15,6 +15,7 @@ from .body import CORNERS, Body, Matrix, Model, Vector
 from .material import Material, NonNegative, Positive
 from .toolpath import Toolpath, Track
 
+AGES = 65  # ages at which bounds look at a material that changes
 FACES = ("x_lower", "x_upper", "y_lower", "y_upper", "z_lower", "z_upper")
 
 
@@ -122,6 +123,7 @@ class Scenario(Model):
     spacing: Positive = Field(description="particle spacing d [m]; a particle stands for d^3")
     sound_speed_ratio: Positive = Field(10.0, description="artificial c of a liquid over its reference speed [-]")
     jitter: Annotated[float, Field(ge=0, le=0.5)] = Field(0.0, description="random shift of bodies' particles / d [-]")
+    pool: Annotated[int, Field(ge=1)] | None = Field(None, description="particles to preallocate; default an estimate")
     seed: Annotated[int, Field(ge=0)] = Field(0, description="the only source of randomness")
     reference: Literal["martin_moyce_front", "viscoplastic_slump"] | None = Field(
         None, description="a published answer to compare with (scenarios/reference)"
@@ -215,7 +217,7 @@ class Scenario(Model):
 
     @cached_property
     def reference_speed(self) -> float:
-        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, or sqrt(g H)."""
+        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, expanding, or sqrt(g H)."""
         g = float(np.linalg.norm(self.acceleration))
         speeds, height = [1e-3], 0.0
         if self.nozzle is not None and self.toolpath is not None and self.track is not None:
@@ -225,6 +227,10 @@ class Scenario(Model):
             speeds.append(body.top_speed)
             speeds.append(math.sqrt(np.abs(self.gradient).max()) * float(np.linalg.norm(body.extent)))
             height = max(height, float(body.center[2] + body.extent[2]) - self.domain.lower[2])
+        if (expansion := self.material.expansion) is not None:
+            sizes = [float(np.linalg.norm(body.extent)) for body in self.bodies]
+            sizes += [self.nozzle.diameter / 2] if self.nozzle is not None else []
+            speeds.append(expansion.speed(max(sizes)))
         return max(*speeds, math.sqrt(g * height))
 
     @property
@@ -234,8 +240,25 @@ class Scenario(Model):
 
     @property
     def wave_speed(self) -> float:
-        """Longitudinal wave speed of the material [m/s]."""
+        """Longitudinal wave speed of the fresh material [m/s]."""
         return self.material.wave_speed(self.liquid_sound_speed)
+
+    @cached_property
+    def aged(self) -> tuple[np.ndarray, list[Material]]:
+        """(ages (n,) [s], the material at each): fresh alone where nothing changes."""
+        if not self.material.changes:
+            return np.zeros(1), [self.material]
+        ages = np.linspace(0.0, self.duration, AGES)
+        return ages, self.material.by_age(ages.tolist())
+
+    @property
+    def top_wave_speed(self) -> float:
+        """Longitudinal wave speed of the stiffest and lightest material of the whole run [m/s]."""
+        return max(m.wave_speed(self.liquid_sound_speed) for m in self.aged[1])
+
+    def made_of(self, material: Material) -> "Scenario":
+        """The same scenario as if all its material were this."""
+        return self.model_copy(update={"material": material})
 
     @cached_property
     def schedule(self) -> tuple[float, int, int]:

@@ -4,7 +4,7 @@ Worlds are copies of one scenario that differ in material, gravity or body force
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import warp as wp
@@ -31,6 +31,8 @@ class Phase:
     relaxation_rate: float
     tait: float
     tension_limit: float
+    wave_speed: float
+    cure: float
 
 
 @wp.struct
@@ -84,14 +86,18 @@ class Scene:
         self.spacing = self.scenario.spacing
         self.periodic = self.scenario.domain.walls.periodic()
         self.sound_speed = max(s.liquid_sound_speed for s in self.scenarios)
-        self.wave_speed = max(s.material.wave_speed(self.sound_speed) for s in self.scenarios)
+        self.wave_speed = max(s.wave_speed for s in self.scenarios)
+        self.top_wave_speed = max(s.top_wave_speed for s in self.scenarios)
         self.box = box_of(self.scenario)
         self._dt = math.nan
         with wp.ScopedDevice(self.device):
             self.dt = wp.zeros(self.worlds, dtype=float)
             self.force = wp.array([_force(s) for s in self.scenarios], dtype=Force)
-            phases = wp.array([self._phase(s.material) for s in self.scenarios], dtype=Phase)
-            self.phases = phases.reshape((self.worlds, 1))
+            rows = [s.material.levels() for s in self.scenarios]
+            self.materials = [m for row in rows for m in row]
+            self.levels = len(rows[0])  # rows of the phase table: levels of cure, the fresh material first
+            table = [self._phase(m, k / max(self.levels - 1, 1)) for row in rows for k, m in enumerate(row)]
+            self.phases = wp.array(table, dtype=Phase).reshape((self.worlds, self.levels))
 
     def _check_worlds(self) -> None:
         vary = {"material", "gravity", "body_force", "body_force_gradient", "name", "title", "seed"}
@@ -103,9 +109,14 @@ class Scene:
                     f"worlds may differ in material, gravity, body_force and seed only; world {i} differs in "
                     f"{', '.join(changed)}"
                 )
+            for section in ("cure", "expansion"):
+                if getattr(other.material, section) != getattr(self.scenario.material, section):
+                    raise UserError(f"worlds must share material.{section}; world {i} differs")
 
-    def _phase(self, material: Material) -> Phase:
+    def _phase(self, material: Material, cure: float) -> Phase:
         phase = Phase()
+        phase.cure = cure
+        phase.wave_speed = material.wave_speed(self.sound_speed)
         phase.density = material.density
         phase.bulk_modulus = material.bulk(self.sound_speed)
         phase.shear_modulus = material.shear_modulus
@@ -119,25 +130,48 @@ class Scene:
         phase.tension_limit = 0.0 if material.youngs_modulus is None else NEVER_YIELDS
         return phase
 
+    def _any(self, holds: Callable[[Material], bool]) -> bool:
+        """Whether this holds for the material of any world at any level of cure."""
+        return any(map(holds, self.materials))
+
     @property
     def elastic(self) -> bool:
-        """Whether any world has shear stiffness."""
-        return any(s.material.youngs_modulus is not None for s in self.scenarios)
+        """Whether anything has shear stiffness, now or later."""
+        return self._any(lambda m: m.youngs_modulus is not None)
 
     @property
     def solid(self) -> bool:
-        """Whether any world's material never flows."""
-        return any(s.material.is_solid for s in self.scenarios)
+        """Whether anything never flows, now or later."""
+        return self._any(lambda m: m.is_solid)
 
     @property
     def flowing(self) -> bool:
-        """Whether any world's material has shear stiffness and flows."""
-        return any(s.material.youngs_modulus is not None and not s.material.is_solid for s in self.scenarios)
+        """Whether anything has shear stiffness and flows, now or later."""
+        return self._any(lambda m: m.youngs_modulus is not None and not m.is_solid)
 
     @property
     def viscous(self) -> bool:
-        """Whether any world has Newtonian viscosity."""
-        return any(s.material.viscosity > 0 for s in self.scenarios)
+        """Whether anything has Newtonian viscosity, now or later."""
+        return self._any(lambda m: m.viscosity > 0)
+
+    @property
+    def cures(self) -> bool:
+        return self.levels > 1
+
+    @property
+    def grows(self) -> bool:
+        """Whether rest volumes grow continuously."""
+        return any((e := s.material.expansion) is not None and e.kind == "growth" for s in self.scenarios)
+
+    @property
+    def expands(self) -> bool:
+        """Whether rest densities come to differ, by growth or by spawning."""
+        return any(s.material.expansion is not None for s in self.scenarios)
+
+    @property
+    def changes(self) -> bool:
+        """Whether parameters or rest densities differ between particles of a world."""
+        return any(s.material.changes for s in self.scenarios)
 
     @property
     def lanes(self) -> int:

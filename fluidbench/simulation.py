@@ -12,13 +12,15 @@ import warp as wp
 from . import health
 from .errors import UserError
 from .health import Health, Vital
-from .layout import capacity_of, sample
+from .layout import capacity_of, emitted, sample
 from .particles import CLAMPED, FREE, OutOfCapacity, Pool
-from .process import emission
+from .process import curing, emission, expansion
+from .process.curing import Curing
 from .process.emission import Emission
+from .process.expansion import Growing
 from .scenario import Scenario
 from .scene import Scene
-from .solver import Solver, configure, get_solver, refusal
+from .solver import Demands, Solver, configure, get_solver, refusal
 from .timestep import Bound, Plan, plan
 
 SORT_TICKS = 32  # ticks between reorderings of the pool, at most
@@ -75,8 +77,13 @@ class Simulation:
             points, volume = sample(body, self.scenario)
             self.pool.place(points, body.velocity_at(points), volume, CLAMPED if body.clamped else FREE)
         self.emission = Emission(self.scene, self.pool) if self.scenario.nozzle is not None else None
+        material = self.scenario.material
+        growing = material.expansion is not None
+        self.growing = Growing(self.scene, self.pool, emitted(self.scenario)) if growing else None
         self.solver = solver_class(self.scene, self.pool, self.config, backend)
+        self.curing = Curing(self.scene, self.pool, self.solver.harden) if material.cure is not None else None
         self.health = Health(self.scene, self.pool)
+        self._demands = [Demands(solver_class, s, self.config) for s in self.scene.scenarios]
         self.tick, self.ticks, self.ticks_per_output = self.scenario.schedule
         self.speed = self.scenario.reference_speed
         self.done = 0
@@ -91,20 +98,22 @@ class Simulation:
         return self.done * self.tick
 
     def bounds(self) -> list[Bound]:
-        """The bounds that hold now, over all worlds, for the speed last seen."""
-        return [b for s in self.scene.scenarios for b in self.solver.bounds(s, self.config, SPEED_MARGIN * self.speed)]
+        """The bounds that hold now, over all worlds and materials that can be there, for the speed last seen."""
+        speed = SPEED_MARGIN * self.speed
+        return [b for d in self._demands for s in d.until(self.now + self.tick)
+                for b in self.solver.bounds(s, self.config, speed)]  # fmt: skip
 
     def prepare(self) -> None:
         """Compile and load every kernel."""
         self.solver.prepare()
         wp.load_module(health, device=self.scene.device)
-        if self.emission is not None:
-            wp.load_module(emission, device=self.scene.device)
+        parts = {emission: self.emission, curing: self.curing, expansion: self.growing}
+        for module in (module for module, part in parts.items() if part is not None):
+            wp.load_module(module, device=self.scene.device)
 
     def advance(self) -> Plan:
         """One tick: feed, plan, and run its substeps."""
-        if self.emission is not None:
-            self.emission.advance(self.now, self.tick)
+        self._age()
         if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
             self.reorder(keys)
         self._refresh()
@@ -113,6 +122,15 @@ class Simulation:
         self._run(steps.substeps)
         self.done += 1
         return steps
+
+    def _age(self) -> None:
+        """What happens to material whatever the method, at the start of a tick."""
+        if self.emission is not None:
+            self.emission.advance(self.now, self.tick)
+        if self.growing is not None:
+            self.growing.advance(self.now, self.tick)
+        if self.curing is not None:
+            self.curing.advance(self.now)
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
@@ -175,8 +193,7 @@ class Simulation:
         outcome.prepare_wall = time.perf_counter() - start
         every = 1 if self.scene.device.is_cpu else min(8, self.ticks_per_output)
         if observe is not None:
-            if self.emission is not None:
-                self.emission.advance(0.0, self.tick)
+            self._age()
             self._refresh()
             observe(self, self.look())
         while self.done < self.ticks and outcome.verdict is Verdict.COMPLETED:

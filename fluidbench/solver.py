@@ -5,11 +5,13 @@ A solver advances a pool of particles by one substep. It knows nothing of nozzle
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from enum import Enum
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from .errors import UserError, suggestion
@@ -34,6 +36,8 @@ class Feature(Enum):
     YIELD = "yield stress"
     FRICTION = "Coulomb friction at walls"
     PERIODIC = "periodic axes"
+    CURE = "material parameters that change with age"
+    EXPANSION = "rest volumes that grow"
 
 
 class Config(BaseModel):
@@ -87,6 +91,13 @@ class Solver(ABC):
     def refresh(self) -> None:  # noqa: B027
         """Called between substeps, outside any graph, after particles appeared, moved in memory or were moved."""
 
+    def harden(self, due: Any) -> None:
+        """Move every particle to its due row of the phase table (int, shape (worlds * capacity,)), between substeps.
+
+        Position, velocity and stress stay as they are: curing does no work. Required of methods that can CURE.
+        """
+        raise NotImplementedError(f"{self.name} cannot cure")
+
     def sort_keys(self) -> Any | None:
         """int64 keys that put neighbours side by side, in the first half of an array of twice the pool's size; None
         to keep the order."""
@@ -119,8 +130,36 @@ def get_solver(name: str) -> type[Solver]:
     raise UserError(f"no solver named '{name}'{suggestion(name, solver_names())}")
 
 
+class Demands:
+    """The materials of a scenario that bound a method's step, as its matter ages: the fresh one, which may always come,
+    and the most demanding one that can be there by then."""
+
+    def __init__(self, solver: type[Solver], scenario: Scenario, config: Any) -> None:
+        self.ages, materials = scenario.aged
+        self.scenarios, least = [], math.inf
+        for material in materials:
+            made = scenario.made_of(material)
+            dt = min(b.dt for b in solver.bounds(made, config, scenario.reference_speed))
+            self.scenarios.append(made if dt < least else self.scenarios[-1])
+            least = min(dt, least)
+
+    def until(self, time: float) -> list[Scenario]:
+        """The scenario as if made of each of those materials, up to a time [s]."""
+        k = min(int(np.searchsorted(self.ages, time)), len(self.ages) - 1)
+        return [self.scenarios[0]] if self.scenarios[k] is self.scenarios[0] else [self.scenarios[0], self.scenarios[k]]
+
+    def worst(self) -> Scenario:
+        """The scenario made of the most demanding material of the whole run."""
+        return self.scenarios[-1]
+
+
 def refusal(solver: type[Solver], scenario: Scenario, config: Any) -> str | None:
     """Why a method cannot run a scenario, for reasons of its own or for want of precision; None when it can."""
+    material = scenario.material
+    needs = {Feature.CURE: material.cure is not None, Feature.EXPANSION: material.expansion is not None}
+    missing = [feature.value for feature, needed in needs.items() if needed and feature not in solver.features]
+    if missing:
+        return f"it has no {' and no '.join(missing)}"
     lost, binding = _lost(solver, scenario, config)
     if lost > LOST * scenario.reference_speed:
         return (
@@ -138,7 +177,8 @@ def approximations(solver: type[Solver], scenario: Scenario, config: Any) -> lis
 
 
 def _lost(solver: type[Solver], scenario: Scenario, config: Any) -> tuple[float, Bound]:
-    binding = min(solver.bounds(scenario, config, scenario.reference_speed), key=lambda bound: bound.dt)
+    worst = Demands(solver, scenario, config).worst()
+    binding = min(solver.bounds(worst, config, scenario.reference_speed), key=lambda bound: bound.dt)
     domain = scenario.domain
     return lost_speed(binding.dt, max(map(abs, (*domain.lower, *domain.upper)))), binding
 

@@ -116,3 +116,25 @@ def strain_and_flow(
         unit = exp(-relaxation * dt)
         rest = 1.0 - unit
     return c_xx * unit + rest, c_yy * unit + rest, c_zz * unit + rest, c_xy * unit, c_xz * unit, c_yz * unit
+
+
+def relieved(b_xx: float, b_yy: float, b_zz: float, b_xy: float, b_xz: float, b_yz: float, ratio: float):
+    """b, det b = 1, whose deviator is `ratio` times that of the given one: (xx, yy, zz, xy, xz, yz).
+
+    With ratio = G / G' the shear stress G dev(b) carries over when the modulus changes from G to G': bonds that form
+    while a material cures form without stress (validation E, stiffening_under_load). The mean m of the new b solves
+    det(m 1 + s) = m^3 - J2 m + det s = 1; Newton from 1.
+    """
+    mean = (b_xx + b_yy + b_zz) / 3.0
+    s_xx = ratio * (b_xx - mean)
+    s_yy = ratio * (b_yy - mean)
+    s_zz = ratio * (b_zz - mean)
+    s_xy = ratio * b_xy
+    s_xz = ratio * b_xz
+    s_yz = ratio * b_yz
+    j2 = 0.5 * (s_xx * s_xx + s_yy * s_yy + s_zz * s_zz) + s_xy * s_xy + s_xz * s_xz + s_yz * s_yz
+    det = s_xx * (s_yy * s_zz - s_yz * s_yz) - s_xy * (s_xy * s_zz - s_yz * s_xz) + s_xz * (s_xy * s_yz - s_yy * s_xz)
+    m = 1.0
+    for _ in range(6):
+        m = m - (m * m * m - j2 * m + det - 1.0) / max(3.0 * m * m - j2, 0.1)
+    return m + s_xx, m + s_yy, m + s_zz, s_xy, s_xz, s_yz

@@ -5,9 +5,12 @@ index in its low 26 bits and the image code cx + 3 cy + 9 cz above them, c = 0 f
 2 for the upper one's. A mirror image completes the kernel at a wall exactly; a periodic image is a shift.
 """
 
+import math
+
 import numpy as np
 import warp as wp
 
+from fluidbench.expansion import Expansion
 from fluidbench.particles import Pool
 from fluidbench.scene import PERIODIC, STICK, Box, Scene
 
@@ -17,6 +20,17 @@ INDEX_MASK = wp.constant(2**26 - 1)
 FAULT_NEIGHBOURS = 4
 ROOM = 1.7  # how much denser than a lattice matter may get before its lists overflow
 WALL_INSET = wp.constant(0.2)  # closest approach to a wall, in particle spacings; at rest the first layer is at 0.5
+
+
+def crowded(expansion: Expansion) -> str | None:
+    """Why spawned children would not fit into the lists; None if they do."""
+    if expansion.kind == "growth" or expansion.per_pass <= 0.9 * ROOM:
+        return None
+    passes = math.ceil(math.log(expansion.ratio) / math.log(0.9 * ROOM))
+    return (
+        f"{expansion.per_pass:.3g} children at once, in the place of one, overfill its neighbour lists; set "
+        f'material.expansion.passes = {passes} or more, or kind = "growth"'
+    )
 
 
 @wp.struct

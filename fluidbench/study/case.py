@@ -19,7 +19,9 @@ from .execute import Finished
 if TYPE_CHECKING:
     import pandas as pd
 
-PHYSICS = ("kinematics", "emission", "liquid", "viscous", "yield stress", "elastic", "viscoelastic", "numerics")
+PHYSICS = (
+    "kinematics", "emission", "liquid", "viscous", "yield stress", "elastic", "viscoelastic", "process", "numerics",
+)  # fmt: skip
 METHOD_OF_LAW = "law"
 
 

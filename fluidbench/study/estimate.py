@@ -5,7 +5,7 @@ from typing import Any
 
 from ..layout import capacity_of
 from ..scenario import Scenario
-from ..solver import Solver, approximations, configure, refusal
+from ..solver import Demands, Solver, approximations, configure, refusal
 from ..timestep import Bound, Plan, plan
 
 
@@ -28,7 +28,7 @@ def estimate(scenario: Scenario, solver: type[Solver]) -> Estimate:
     """Bounds at the scenario's reference speed, and what follows from them."""
     config: Any = configure(solver, scenario)
     tick, ticks, _ = scenario.schedule
-    bounds = solver.bounds(scenario, config, scenario.reference_speed)
+    bounds = solver.bounds(Demands(solver, scenario, config).worst(), config, scenario.reference_speed)
     steps = plan(bounds, tick)
     particles = capacity_of(scenario)
     filling = min(scenario.track.end / scenario.duration, 1.0) if scenario.track is not None else 0.0

@@ -10,6 +10,7 @@ from fluidbench.particles import CARRIED, CLAMPED, FREE
 from fluidbench.scene import Force, Phase, force_at, is_solid
 
 from .. import constitutive
+from ..aging import carried_compression, relieved_tensor
 from ..bind import warp_func
 from ..smoothing import quadratic_spline
 from ..vector_access import add_vec4, in_company, load_vec4, run_of
@@ -52,6 +53,7 @@ def find_blocks(
 
 @wp.kernel
 def clear_grid(active: wp.array(dtype=int), lanes: int, raw: wp.array(dtype=wp.vec4)):
+    """Empty the nodes of all active blocks."""
     t = wp.tid()
     n = wp.min(active[0] * 64, raw.shape[0])
     while t < n:
@@ -122,12 +124,17 @@ def p2g(
     grid: Grid, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), phases: wp.array2d(dtype=Phase),
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), affine: wp.array(dtype=wp.mat33),
     mass: wp.array(dtype=float), volume: wp.array(dtype=float), phase_of: wp.array(dtype=int),
-    held: wp.array(dtype=int), table: wp.array(dtype=int),
+    held: wp.array(dtype=int), table: wp.array(dtype=int), expands: int,
     # outputs
     volume_ratio: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
-    elastic_shear: wp.array(dtype=wp.vec3), raw: wp.array(dtype=wp.vec4), fault: wp.array(dtype=int),
+    elastic_shear: wp.array(dtype=wp.vec3), raw: wp.array(dtype=wp.vec4), fill: wp.array(dtype=wp.vec4),
+    fault: wp.array(dtype=int),
 ):  # fmt: skip
-    """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18)."""
+    """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18).
+
+    Where rest densities differ (`expands`) mass does not tell how full a node is: `fill` collects fresh density times
+    rest volume instead.
+    """
     p = wp.tid()
     world = p / capacity
     on = p - world * capacity < count[world]
@@ -194,17 +201,20 @@ def p2g(
                 w = wxy * wz[r]
                 node = wp.where(on, slot * 64 + lx[o] + ly[q] + lz[r], -1)
                 add_vec4(raw, node, wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m), run)
+                if expands == 1:
+                    add_vec4(fill, node, wp.vec4(0.0, 0.0, 0.0, w * volume[p] * phase.density), run)
 
 
 @wp.kernel
 def grid_step(
     grid: Grid, lanes: int, active: wp.array(dtype=int), block_of: wp.array(dtype=int), table: wp.array(dtype=int),
-    raw: wp.array(dtype=wp.vec4), dt: wp.array(dtype=float), force: wp.array(dtype=Force),
-    phases: wp.array2d(dtype=Phase),
+    raw: wp.array(dtype=wp.vec4), fill: wp.array(dtype=wp.vec4), expands: int, dt: wp.array(dtype=float),
+    force: wp.array(dtype=Force), phases: wp.array2d(dtype=Phase),
     # outputs
     moving: wp.array(dtype=wp.vec4),
 ):  # fmt: skip
-    """Velocity of every node from momentum, gravity and walls; the fourth component is its density [kg/m^3].
+    """Velocity of every node from momentum, gravity and walls; the fourth component is its density [kg/m^3], or, where
+    matter expands, the density that fresh matter of the same rest volume would have. `fill` is `raw` where it does not.
 
     Ghost nodes behind a mirroring wall get the mirrored velocity of their partner, so that the gather sees a true
     mirror: zeroing them instead costs energy at every step.
@@ -223,7 +233,7 @@ def grid_step(
         if wall:
             for axis in range(3):
                 near = node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
-                held = grip(grid, world, node, axis, phases[world, 0].density, table, raw)
+                held = grip(grid, world, node, axis, phases[world, 0].density, table, fill)
                 if near and held > 0.0:
                     hold = wp.min(hold, held)
                     touching[axis] = 1
@@ -238,6 +248,11 @@ def grid_step(
             if wall:
                 v = wall_velocity(grid, inside, touching, v)
             density = total[3] * grid.inv_volume
+            if expands == 1:
+                if wall:
+                    density = folded(grid, world, inside, touching, table, fill)[3] * grid.inv_volume
+                else:
+                    density = fill[t][3] * grid.inv_volume
             if wall:
                 density *= plane_share(grid, inside)
             result = wp.vec4(v[0], v[1], v[2], density)
@@ -273,7 +288,7 @@ def contained(grid: Grid, x: wp.vec3):
 class Feedback:
     """How the density on the grid corrects the volume ratio that particles integrate, and so drifts."""
 
-    rate: float  # [1/s]
+    rate: float  # over the wave speed [1/m]
     tolerance: float  # overlap that is left alone [-]
 
 
@@ -333,7 +348,7 @@ def g2p(
             phase = phases[world, phase_of[p]]
             crowding = j * density / phase.density - 1.0 - feedback.tolerance
             if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
-                volume_ratio[p] = j * (1.0 - wp.min(dt[world] * feedback.rate * crowding, 0.1))
+                volume_ratio[p] = j * (1.0 - wp.min(dt[world] * feedback.rate * phase.wave_speed * crowding, 0.1))
         free = x + dt[world] * v
         x = contained(grid, free)
         position[p] = x
@@ -345,3 +360,25 @@ def g2p(
         after = first_node(grid, x)
         if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
             activate_stencil(grid, world, after, table, block_of, active, fault)
+
+
+@wp.kernel
+def harden(
+    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    # outputs
+    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), volume_ratio: wp.array(dtype=float),
+    elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """Move particles to the phase they are due; their stress and their present volume carry over (see aging.py)."""
+    p = wp.tid()
+    world = p / capacity
+    if p - world * capacity < count[world] and due[p] != phase_of[p]:
+        before, after = phases[world, phase_of[p]], phases[world, due[p]]
+        phase_of[p] = due[p]
+        b, s = relieved_tensor(before, after, elastic_normal[p], elastic_shear[p])
+        elastic_normal[p] = b
+        elastic_shear[p] = s
+        j = volume_ratio[p]
+        carried = 1.0 / (1.0 + carried_compression(before, after, 1.0 / j - 1.0))
+        volume_ratio[p] = carried
+        volume[p] = volume[p] * (j / carried)

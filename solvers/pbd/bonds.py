@@ -26,6 +26,7 @@ ANCHORED = wp.constant(0.75)  # what bonds closer than this to a stick wall is p
 DAMPED = wp.constant(
     0.115
 )  # share of a Jacobi step: 26 / 3 bonds pull each way, so that 3 / 26 is stable for all modes
+GELLED = wp.constant(0.5)  # degree of cure from which bonds hold
 FAULT_BONDS = 8
 LOOSE, FRESH, BOUND = wp.constant(0), wp.constant(1), wp.constant(2)
 
@@ -37,6 +38,25 @@ class Bonds:
     rest: wp.array(dtype=float)  # [m]
     multiplier: wp.array(dtype=float)  # of the present substep
     state: wp.array(dtype=int)
+
+
+@wp.func
+def bonded(phase: Phase):
+    """Whether bonds hold the material: what never flows, and what has gelled while it cures."""
+    return is_solid(phase) or (phase.cure >= GELLED and phase.shear_modulus > 0.0)
+
+
+@wp.func
+def youngs_between(a: Phase, b: Phase):
+    """Young's modulus of a bond, the mean of both ends' E = 9 K G / (3 K + G) [Pa]: one bond, one force."""
+    first = 9.0 * a.shear_modulus / (3.0 + a.shear_modulus / a.bulk_modulus)
+    second = 9.0 * b.shear_modulus / (3.0 + b.shear_modulus / b.bulk_modulus)
+    return 0.5 * (first + second)
+
+
+def needed(scene: Scene) -> bool:
+    """Whether anything is bonded, now or later."""
+    return scene.solid or (scene.cures and scene.elastic)
 
 
 @wp.func
@@ -75,7 +95,7 @@ def awaken(
     """Particles that have just come free may bond in this substep; those on a stick wall become part of it."""
     i = wp.tid()
     world = i / capacity
-    if i - world * capacity < count[world] and is_solid(phases[world, phase_of[i]]):
+    if i - world * capacity < count[world] and bonded(phases[world, phase_of[i]]):
         state = bonds.state[i]
         if state == FRESH:
             bonds.state[i] = BOUND
@@ -136,8 +156,6 @@ def stretch(
     if i - world * capacity < count[world]:
         shift = wp.vec3(0.0, 0.0, 0.0)
         phase = phases[world, phase_of[i]]
-        # E = 9 K G / (3 K + G)
-        youngs = 9.0 * phase.shear_modulus / (3.0 + phase.shear_modulus / phase.bulk_modulus)
         h = dt[world]
         own = float(0.0)
         if held[i] == FREE:
@@ -154,6 +172,7 @@ def stretch(
             r = nearest_image(box, x - image_position(box, position[j], entry >> INDEX_BITS))
             length = wp.length(r)
             rest = bonds.rest[at]
+            youngs = youngs_between(phase, phases[world, phase_of[j]])
             compliance = 1.0 / (bond_stiffness(youngs, spacing, rest) * h * h)
             before = float(0.0)
             if sweep > 0:
@@ -162,6 +181,49 @@ def stretch(
             bonds.multiplier[at] = before + step
             shift += (own * step / wp.max(length, 1.0e-9)) * r
         correction[i] = shift
+
+
+@wp.kernel
+def relieve(
+    capacity: int, count: wp.array(dtype=int), box: Box, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int),
+    due: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), bonds: Bonds,
+):  # fmt: skip
+    """Bonds of what stiffens keep their force: the rest length moves towards the present one as k / k'."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        for k in range(bonds.number[i]):
+            at = k * bonds.number.shape[0] + i
+            entry = bonds.partner[at]
+            j = entry & INDEX_MASK
+            if due[i] != phase_of[i] or due[j] != phase_of[j]:
+                before = youngs_between(phases[world, phase_of[i]], phases[world, phase_of[j]])
+                after = youngs_between(phases[world, due[i]], phases[world, due[j]])
+                r = position[i] - image_position(box, position[j], entry >> INDEX_BITS)
+                length = wp.length(nearest_image(box, r))
+                bonds.rest[at] = length - (before / after) * (length - bonds.rest[at])
+
+
+@wp.kernel
+def yield_bonds(
+    capacity: int, count: wp.array(dtype=int), box: Box, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3), bonds: Bonds,
+):  # fmt: skip
+    """Perfect plasticity: a bond stretched or shortened beyond the yield strain takes on the length that it has, but
+    for that strain. In uniaxial stress it is sqrt(3) tau_y / E."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        for k in range(bonds.number[i]):
+            at = k * bonds.number.shape[0] + i
+            entry = bonds.partner[at]
+            j = entry & INDEX_MASK
+            own, other = phases[world, phase_of[i]], phases[world, phase_of[j]]
+            stress = 0.5 * (own.yield_stress + other.yield_stress)
+            limit = wp.sqrt(3.0) * stress / youngs_between(own, other)
+            r = position[i] - image_position(box, position[j], entry >> INDEX_BITS)
+            length = wp.length(nearest_image(box, r))
+            bonds.rest[at] = wp.clamp(bonds.rest[at], length / (1.0 + limit), length / wp.max(1.0 - limit, 0.1))
 
 
 class Network:
@@ -197,6 +259,22 @@ class Network:
             [scene.box, scene.spacing, sweep, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase, pool.held,
              pool.position, pool.mass, self.bonds],
             [correction], device=scene.device,
+        )  # fmt: skip
+
+    def relieve(self, due: wp.array) -> None:
+        pool, scene = self.pool, self.scene
+        wp.launch(
+            relieve, pool.size,
+            [pool.capacity, pool.count, scene.box, scene.phases, pool.phase, due, pool.position, self.bonds],
+            device=scene.device,
+        )  # fmt: skip
+
+    def flow(self) -> None:
+        pool, scene = self.pool, self.scene
+        wp.launch(
+            yield_bonds, pool.size,
+            [pool.capacity, pool.count, scene.box, scene.phases, pool.phase, pool.position, self.bonds],
+            device=scene.device,
         )  # fmt: skip
 
     def footprint(self) -> dict[str, int]:

@@ -9,14 +9,16 @@ viscosity is mapped onto velocity smoothing (laws.smoothing_weight).
 import warp as wp
 
 from fluidbench.particles import CARRIED
-from fluidbench.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at, is_solid
+from fluidbench.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
 
 from .. import constitutive
+from ..aging import relieved_tensor, rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky, spiky_slope
 from . import laws
+from .bonds import bonded
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -117,7 +119,7 @@ def multipliers(
         fill[i] = dense
         # One-sided: a surface must not be pulled together. Lengths are scaled by the spacing to make epsilon a number.
         scale = num.spacing * num.spacing
-        limit = 1.0 + wp.where(is_solid(phases[world, phase_of[i]]), SLACK_SOLID, SLACK)
+        limit = 1.0 + wp.where(bonded(phases[world, phase_of[i]]), SLACK_SOLID, SLACK)
         multiplier[i] = -wp.max(dense - limit, 0.0) / ((squares + wp.dot(own, own)) * scale + num.relaxation)
 
 
@@ -186,7 +188,8 @@ def velocities(
 def strain(
     num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
     phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float), velocity: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), volume: wp.array(dtype=float),
+    velocity: wp.array(dtype=wp.vec3),
     # outputs
     elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
     stress: wp.array(dtype=wp.mat33),
@@ -196,7 +199,9 @@ def strain(
     i = wp.tid()
     world = i / capacity
     phase = phases[world, phase_of[i]]
-    if i - world * capacity < count[world] and not is_solid(phase):
+    if i - world * capacity < count[world] and bonded(phase):
+        stress[i] = wp.mat33()
+    elif i - world * capacity < count[world]:
         x = position[i]
         v = velocity[i]
         slope = wp.mat33()
@@ -217,7 +222,8 @@ def strain(
             moment -= wp.outer(g * r, r)
         correction = symmetric_inverse(moment)
         slope = slope * correction
-        modulus = conveyed_modulus(phase.shear_modulus, num.stiffness, phase.density, num.spacing, dt[world])
+        rest = rest_density(mass, volume, i)
+        modulus = conveyed_modulus(phase.shear_modulus, num.stiffness, rest, num.spacing, dt[world])
         b = elastic_normal[i]
         s = elastic_shear[i]
         if held[i] != CARRIED:
@@ -231,14 +237,14 @@ def strain(
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[i] = b
             elastic_shear[i] = s
-        stress[i] = (1.0 / phase.density) * (elastic_stress(modulus, b, s, 0.0) * correction)
+        stress[i] = elastic_stress(modulus, b, s, 0.0) * correction
 
 
 @wp.kernel
 def pull(
     num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    held: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float),
-    stress: wp.array(dtype=wp.mat33), velocity: wp.array(dtype=wp.vec3),
+    held: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33), velocity: wp.array(dtype=wp.vec3),
     # outputs
     smoothed: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
@@ -269,7 +275,7 @@ def pull(
             w = volume[j] * num.weight * kernel(distance * distance, num.support)
             damping -= (w * wp.dot(v - vj, r) / wp.max(distance * distance, 1.0e-18)) * r
         if held[i] == 0:
-            v += dt[world] * a + num.calm * damping
+            v += (dt[world] / rest_density(mass, volume, i)) * a + num.calm * damping
         smoothed[i] = v
 
 
@@ -277,7 +283,8 @@ def pull(
 def shear(
     num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
     phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float), velocity: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), volume: wp.array(dtype=float),
+    velocity: wp.array(dtype=wp.vec3),
     # outputs
     smoothed: wp.array(dtype=wp.vec3),
 ):  # fmt: skip
@@ -305,7 +312,8 @@ def shear(
             total += w
         out = v
         if held[i] == 0:
-            c = smoothing_weight(phase.viscosity, phase.density, dt[world], num.support, float(num.sweeps))
+            rest = rest_density(mass, volume, i)
+            c = smoothing_weight(phase.viscosity, rest, dt[world], num.support, float(num.sweeps))
             out = v + (c / wp.max(total, 1.0)) * mean
         smoothed[i] = out
 
@@ -330,7 +338,7 @@ def rub(
     if i - world * capacity < count[world] and held[i] == 0:
         v = velocity[i]
         x = position[i]
-        solid = is_solid(phases[world, phase_of[i]])
+        solid = bonded(phases[world, phase_of[i]])
         for axis in range(3):
             kind, friction = box.lower_kind[axis], box.lower_friction[axis]
             touching = rubbing(kind, x[axis] - box.lower[axis], spacing, solid)
@@ -348,3 +356,21 @@ def rub(
                 v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
                 v[axis] = normal
         velocity[i] = v
+
+
+@wp.kernel
+def harden(
+    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    # outputs
+    phase_of: wp.array(dtype=int), elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """Move particles to the phase they are due; the elastic stress of what still flows carries over."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and due[i] != phase_of[i]:
+        if elastic == 1:
+            before, after = phases[world, phase_of[i]], phases[world, due[i]]
+            b, s = relieved_tensor(before, after, elastic_normal[i], elastic_shear[i])
+            elastic_normal[i] = b
+            elastic_shear[i] = s
+        phase_of[i] = due[i]

@@ -13,8 +13,9 @@ from fluidbench.scene import FRICTION, STICK, Scene
 from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound
 
-from .. import neighbours
-from ..neighbours import FAULT_NEIGHBOURS, Neighbours
+from .. import aging, neighbours
+from ..aging import present_density
+from ..neighbours import FAULT_NEIGHBOURS, Neighbours, crowded
 from ..order import CellOrder
 from ..smoothing import spiky
 from . import bonds, laws
@@ -72,6 +73,8 @@ class SolverPBD(Solver):
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
         m, dt = scenario.material, cls.usual_dt(scenario, config)
+        if m.expansion is not None and (reason := crowded(m.expansion)):
+            return reason
         most = laws.largest_modulus(config.shear_stiffness, m.density, scenario.spacing, dt)
         if m.youngs_modulus is None or m.is_solid or m.flow_threshold < most or m.relaxation_time is not None:
             return None
@@ -121,13 +124,13 @@ class SolverPBD(Solver):
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
         self.num.sweeps = config.shear_sweeps
         kinds = (*scene.box.lower_kind, *scene.box.upper_kind)
-        self.rubs = FRICTION in kinds or (scene.solid and STICK in kinds)
+        self.rubs = FRICTION in kinds or (bonds.needed(scene) and STICK in kinds)
         self.num.calm = config.calm
         self.num.stiffness = config.shear_stiffness
         if scene.flowing:
             pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
             pool.add_field("elastic_shear", wp.vec3)
-        self.network = bonds.Network(scene, pool) if scene.solid else None
+        self.network = bonds.Network(scene, pool) if bonds.needed(scene) else None
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)
@@ -143,6 +146,8 @@ class SolverPBD(Solver):
         self.neighbours.refresh()
 
     def substep(self) -> None:
+        if self.scene.grows:
+            self.swell()
         self.predict()
         self.lists()
         if self.network is not None:
@@ -150,6 +155,8 @@ class SolverPBD(Solver):
             for sweep in range(self.config.bond_sweeps):
                 self.stretch(sweep)
                 self.apply()
+            if self.scene.cures:
+                self.network.flow()
         for _ in range(self.config.iterations):
             self.multipliers()
             self.correct()
@@ -169,6 +176,16 @@ class SolverPBD(Solver):
 
     def _active(self) -> list[Any]:
         return [self.pool.capacity, self.pool.count]
+
+    def swell(self) -> None:
+        self._launch(aging.swell, [*self._active(), self.scene.dt, self.pool.growth], [self.pool.volume])
+
+    def harden(self, due: wp.array) -> None:
+        pool, flowing = self.pool, self.scene.flowing
+        tensor = [pool.elastic_normal, pool.elastic_shear] if flowing else [self.motion, self.motion]
+        if self.network is not None:
+            self.network.relieve(due)
+        self._launch(kernels.harden, [int(flowing), *self._active(), self.scene.phases, due], [pool.phase, *tensor])
 
     def predict(self) -> None:
         pool, scene = self.pool, self.scene
@@ -227,7 +244,7 @@ class SolverPBD(Solver):
         self._launch(
             kernels.strain,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
-             pool.position, pool.volume, pool.velocity],
+             pool.position, pool.mass, pool.volume, pool.velocity],
             [pool.elastic_normal, pool.elastic_shear, self.stress],
         )  # fmt: skip
 
@@ -235,8 +252,8 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         self._launch(
             kernels.pull,
-            [self.num, scene.box, self.pairs, *self._active(), scene.dt, pool.held, pool.position, pool.volume,
-             self.stress, pool.velocity],
+            [self.num, scene.box, self.pairs, *self._active(), scene.dt, pool.held, pool.position, pool.mass,
+             pool.volume, self.stress, pool.velocity],
             [self.smoothed],
         )  # fmt: skip
         wp.copy(pool.velocity, self.smoothed)
@@ -246,7 +263,7 @@ class SolverPBD(Solver):
         self._launch(
             kernels.shear,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
-             pool.position, pool.volume, pool.velocity],
+             pool.position, pool.mass, pool.volume, pool.velocity],
             [self.smoothed],
         )  # fmt: skip
         wp.copy(pool.velocity, self.smoothed)
@@ -261,15 +278,14 @@ class SolverPBD(Solver):
         )  # fmt: skip
 
     def prepare(self) -> None:
-        for module in (kernels, neighbours, *([bonds] if self.network else [])):
+        for module in (kernels, neighbours, aging, *([bonds] if self.network else [])):
             wp.load_module(module, device=self.scene.device)
 
     def sort_keys(self) -> Any:
         return self.order.keys() if self.network is None else None  # bonds name their partners by slot
 
     def densities(self) -> np.ndarray:
-        rest = np.array([s.material.density for s in self.scene.scenarios]).repeat(self.pool.capacity)
-        return rest * np.maximum(self.fill.numpy(), 1.0)
+        return present_density(self.pool, 1.0 / np.maximum(self.fill.numpy(), 1.0))
 
     def footprint(self) -> dict[str, int]:
         own = ("motion", "correction", "smoothed", "multiplier", "fill", "stress")

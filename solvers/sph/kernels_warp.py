@@ -14,6 +14,7 @@ from fluidbench.particles import CARRIED
 from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid
 
 from .. import constitutive
+from ..aging import carried_compression, relieved_tensor, rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import (
@@ -46,7 +47,6 @@ class Smoothing:
     spacing: float  # [m]
     viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
     lattice: float  # makes the second moment of a lattice exactly its density [-]
-    sound_speed: float  # longitudinal wave speed [m/s]
     density_diffusion: float  # delta [-]
     artificial_viscosity: float  # alpha [-]
     artificial_stress: float  # epsilon [-]
@@ -59,15 +59,17 @@ WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below i
 
 
 @functools.cache
-def passes(strength: bool, viscous: bool) -> SimpleNamespace:
-    """The passes for materials with or without shear stiffness and viscosity: unused physics costs nothing."""
+def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
+    """The passes for materials with or without shear stiffness, viscosity, and parameters or rest densities that differ
+    between particles: unused physics costs nothing."""
     name = f"{'strength' if strength else 'liquid'}_{'viscous' if viscous else 'inviscid'}"
+    name += "_changing" if changing else ""
 
     def strain(
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
         phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
         position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
-        density: wp.array(dtype=float), lift: wp.array(dtype=wp.vec3),
+        volume: wp.array(dtype=float), density: wp.array(dtype=float), lift: wp.array(dtype=wp.vec3),
         # outputs
         elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
         new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
@@ -84,6 +86,10 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             x = position[i]
             v = velocity[i]
             rho = density[i]
+            rest, sound = float(phase.density), float(phase.wave_speed)
+            if wp.static(changing):
+                rest = rest_density(mass, volume, i)
+                sound = phase.wave_speed * wp.sqrt(phase.density / rest)
             own_lift = lift[i]
             inv_h = 1.0 / num.h
             inflow = float(0.0)
@@ -105,13 +111,18 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 r = x - xj
                 u = v - vj
                 w = mass[j] * slope(wp.sqrt(wp.dot(r, r)) * inv_h, num.h)
-                inflow += w * wp.dot(u, r)
                 lifts = lift[j]
                 if code > 0:
                     lifts = image_gradient(box, lifts, code)
-                spread += w * (rho - density[j] - wp.dot(own_lift + lifts, r))
+                partner = density[j]
+                if wp.static(changing):
+                    # in volumes and compressions: partners may be at rest at another density
+                    w *= rest / rest_density(mass, volume, j)
+                    partner *= rest / rest_density(mass, volume, j)
+                spread += w * (rho - partner - wp.dot(own_lift + lifts, r))
                 second -= w * wp.dot(r, r)
                 lean += w * r
+                inflow += w * wp.dot(u, r)
                 if wp.static(strength):
                     gradient -= wp.outer(w * u, r)
                     moment -= wp.outer(w * r, r)
@@ -128,18 +139,19 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
             if drift > 0.0:
                 whole = 1.0
             drift = wp.sign(drift) * wp.max(wp.abs(drift) - num.density_tolerance * rho, 0.0)
-            if phase.relaxation_rate > 0.0:
-                # in a stretched thread a pair too close reads as thin, and would be pulled closer
-                drift = wp.max(drift, wp.min(phase.density - rho, 0.0))
+            if phase.relaxation_rate > 0.0 or rest < 0.99 * phase.density:
+                # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and
+                # would be pulled closer
+                drift = wp.max(drift, wp.min(rest - rho, 0.0))
             if is_solid(phase):
                 drift = 0.0  # density is its strain: nothing may level it
                 spread = 0.0
-            inflow += num.density_feedback * num.sound_speed / num.h * whole * drift
+            inflow += num.density_feedback * sound / num.h * whole * drift
             h = dt[world]
-            growth = inflow + 2.0 * num.density_diffusion * num.h * num.sound_speed * spread / rho
-            rho = wp.max(rho + h * growth, FLOOR * phase.density)
+            growth = inflow + 2.0 * num.density_diffusion * num.h * sound * spread / rho
+            rho = wp.max(rho + h * growth, FLOOR * rest)
             new_density[i] = rho
-            p = pressure(rho / phase.density - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+            p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
             scale = 1.0 / (rho * rho)
             if wp.static(strength):
                 b = elastic_normal[i]
@@ -156,7 +168,7 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     s = wp.vec3(b_xy, b_xz, b_yz)
                     elastic_normal[i] = b
                     elastic_shear[i] = s
-                g = phase.shear_modulus * rho / phase.density  # Cauchy from Kirchhoff: divide by J
+                g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J
                 # With the correction of its gradient stress does on the particles exactly the work of the strain.
                 stress[i] = scale * (elastic_stress(g, b, s, p) * correction)
             else:
@@ -166,7 +178,8 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
         phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
         position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
-        density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
+        volume: wp.array(dtype=float), density: wp.array(dtype=float), load: wp.array(dtype=float),
+        stress: wp.array(dtype=wp.mat33),
         rate: wp.array(dtype=wp.mat33),
         # outputs
         acceleration: wp.array(dtype=wp.vec3),
@@ -185,8 +198,12 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 own_rate = rate[i]
             inv_h = 1.0 / num.h
             tiny = 0.01 * num.h * num.h
-            shock = num.artificial_viscosity * num.h * num.sound_speed / rho
+            shock = num.artificial_viscosity * num.h * phase.wave_speed / rho
             drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
+            rest = float(phase.density)
+            if wp.static(changing):
+                rest = rest_density(mass, volume, i)
+                shock = phase.wave_speed * wp.sqrt(phase.density / rest)
             inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
             pull = force_at(force[world], x)
             a = wp.vec3(0.0, 0.0, 0.0)
@@ -207,6 +224,16 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                 q = wp.sqrt(r2) * inv_h
                 f = mass[j] * slope(q, num.h)
                 ur = wp.dot(u, r)
+                rubs, flows = float(shock), float(drag)
+                if wp.static(changing):
+                    # both partners must find the same force: means of what differs between them
+                    other_phase = phases[world, phase_of[j]]
+                    other_rest = rest_density(mass, volume, j)
+                    fast = shock + other_phase.wave_speed * wp.sqrt(other_phase.density / other_rest)
+                    rubs = num.artificial_viscosity * num.h * fast / (rho + density[j])
+                    thin = phase.viscosity * other_phase.viscosity
+                    thin *= 2.0 / wp.max(phase.viscosity + other_phase.viscosity, 1.0e-30)
+                    flows = 10.0 * num.viscous_lattice * thin / (rest * other_rest)
                 scalar = float(0.0)
                 if wp.static(strength):
                     # artificial viscosity on what the velocity gradients of both do not explain, such as rows that slip
@@ -214,14 +241,14 @@ def passes(strength: bool, viscous: bool) -> SimpleNamespace:
                     flow = rate[j]
                     if code > 0:
                         flow = image_rate(box, flow, code)
-                    scalar = shock * (ur - 0.5 * wp.dot(r, (own_rate + flow) * r)) / (r2 + tiny)
+                    scalar = rubs * (ur - 0.5 * wp.dot(r, (own_rate + flow) * r)) / (r2 + tiny)
                 else:
                     # for approaching particles (Monaghan 1992)
-                    scalar = shock * wp.min(ur, 0.0) / (r2 + tiny)
+                    scalar = rubs * wp.min(ur, 0.0) / (r2 + tiny)
                 if wp.static(viscous):
                     # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j), at rest density: a cavitated liquid, whose
                     # density is low, would break the bound on dt
-                    scalar += drag * ur / (r2 + 0.01 * tiny)
+                    scalar += flows * ur / (r2 + 0.01 * tiny)
                 push = wp.vec3(0.0, 0.0, 0.0)
                 if wp.static(strength):
                     other = stress[j]
@@ -275,7 +302,8 @@ def _named(function, name: str) -> wp.Kernel:
 def move(
     box: Box, spacing: float, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
     phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
-    held: wp.array(dtype=int), acceleration: wp.array(dtype=wp.vec3), new_density: wp.array(dtype=float),
+    held: wp.array(dtype=int), mass: wp.array(dtype=float), volume: wp.array(dtype=float),
+    acceleration: wp.array(dtype=wp.vec3), new_density: wp.array(dtype=float),
     # outputs
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), density: wp.array(dtype=float),
     lift: wp.array(dtype=wp.vec3),
@@ -294,7 +322,8 @@ def move(
         if held[i] == 0:
             v += h * acceleration[i]
             phase = phases[world, phase_of[i]]
-            stiffness = 0.5 * phase.density * phase.density / phase.bulk_modulus
+            rest = rest_density(mass, volume, i)
+            stiffness = 0.5 * rest * rest / phase.bulk_modulus
             carried = stiffness * (force_at(force[world], position[i]) - acceleration[i])
         lift[i] = carried
         free = position[i] + h * v
@@ -305,3 +334,26 @@ def move(
         position[i] = x
         velocity[i] = v
         density[i] = new_density[i]
+
+
+@wp.kernel
+def harden(
+    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    mass: wp.array(dtype=float), density: wp.array(dtype=float),
+    # outputs
+    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """Move particles to the phase they are due; their stress and their present density carry over (see aging.py)."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and due[i] != phase_of[i]:
+        before, after = phases[world, phase_of[i]], phases[world, due[i]]
+        phase_of[i] = due[i]
+        if elastic == 1:
+            b, s = relieved_tensor(before, after, elastic_normal[i], elastic_shear[i])
+            elastic_normal[i] = b
+            elastic_shear[i] = s
+        compression = density[i] / rest_density(mass, volume, i) - 1.0
+        rest = density[i] / (1.0 + carried_compression(before, after, compression))
+        volume[i] = mass[i] / rest

@@ -14,8 +14,8 @@ from fluidbench.scene import Scene
 from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound
 
-from .. import neighbours
-from ..neighbours import FAULT_NEIGHBOURS, Neighbours
+from .. import aging, neighbours
+from ..neighbours import FAULT_NEIGHBOURS, Neighbours, crowded
 from ..order import CellOrder
 from ..smoothing import wendland_slope
 from . import kernels_warp as kernels
@@ -44,12 +44,13 @@ class ConfigSPH(Config):
     def alpha(self, material: Material) -> float:
         if material.relaxation_time is not None:
             return self.artificial_viscosity_viscoelastic
-        return self.artificial_viscosity if material.youngs_modulus is None else self.artificial_viscosity_solid
+        return self.artificial_viscosity_solid if material.elastic else self.artificial_viscosity
 
     def smoothing(self, solid: bool) -> float:
         return self.smoothing_ratio_solid if solid else self.smoothing_ratio
 
 
+FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
 
 
@@ -69,7 +70,10 @@ class SolverSPH(Solver):
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
         speed, c = scenario.reference_speed, scenario.wave_speed
-        if speed < FASTEST * c:
+        expansion = scenario.material.expansion
+        if expansion is not None and (reason := crowded(expansion)):
+            return reason
+        if speed < (FASTEST if expansion is None else FASTEST_GROWTH) * c:
             return None
         return (
             f"it moves at {speed:.3g} m/s, too near its own sound ({c:.3g} m/s): particles would be pushed "
@@ -79,7 +83,7 @@ class SolverSPH(Solver):
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
         c, m = scenario.wave_speed, scenario.material
-        solid = m.youngs_modulus is not None
+        solid = m.elastic
         h = config.smoothing(solid) * scenario.spacing
         # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1).
         nu = m.viscosity / m.density + config.alpha(m) * h * c / 10.0
@@ -103,13 +107,12 @@ class SolverSPH(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.kernels = kernels.passes(scene.elastic, scene.viscous)
+        self.kernels = kernels.passes(scene.elastic, scene.viscous, scene.changes)
         self.num = kernels.Smoothing()
         self.num.h = config.smoothing(scene.elastic) * scene.spacing
         self.num.spacing = scene.spacing
         second, fourth = lattice_moments(config.smoothing(scene.elastic))
         self.num.lattice, self.num.viscous_lattice = 1.0 / second, fourth**-0.5
-        self.num.sound_speed = scene.wave_speed
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.artificial_stress = config.artificial_stress
@@ -142,8 +145,28 @@ class SolverSPH(Solver):
         self.neighbours.refresh()
 
     def substep(self) -> None:
+        if self.scene.grows:
+            self.swell()
         for name in self.passes:
             getattr(self, name)()
+
+    def swell(self) -> None:
+        pool = self.pool
+        wp.launch(
+            aging.swell, pool.size, [pool.capacity, pool.count, self.scene.dt, pool.growth], [pool.volume],
+            device=self.scene.device,
+        )  # fmt: skip
+
+    def harden(self, due: wp.array) -> None:
+        pool, elastic = self.pool, self.scene.elastic
+        tensor = [pool.elastic_normal, pool.elastic_shear] if elastic else [self.unused, self.unused]
+        wp.launch(
+            kernels.harden,
+            pool.size,
+            [int(elastic), pool.capacity, pool.count, self.scene.phases, due, pool.mass, pool.density],
+            [pool.phase, pool.volume, *tensor],
+            device=self.scene.device,
+        )
 
     def lists(self) -> None:
         self.neighbours.update()
@@ -158,7 +181,7 @@ class SolverSPH(Solver):
         wp.launch(
             self.kernels.strain,
             pool.size,
-            [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.density, pool.lift],
+            [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.volume, pool.density, pool.lift],
             [*elastic, self.new_density, self.load, self.stress, self.rate],
             device=self.scene.device,
         )
@@ -168,8 +191,8 @@ class SolverSPH(Solver):
         wp.launch(
             self.kernels.force,
             pool.size,
-            [*self._common(), self.scene.force, pool.position, pool.velocity, pool.mass, self.new_density, self.load,
-             self.stress, self.rate],
+            [*self._common(), self.scene.force, pool.position, pool.velocity, pool.mass, pool.volume, self.new_density,
+             self.load, self.stress, self.rate],
             [self.acceleration],
             device=self.scene.device,
         )  # fmt: skip
@@ -189,6 +212,8 @@ class SolverSPH(Solver):
                 pool.phase,
                 scene.force,
                 pool.held,
+                pool.mass,
+                pool.volume,
                 self.acceleration,
                 self.new_density,
             ],
@@ -197,7 +222,7 @@ class SolverSPH(Solver):
         )
 
     def prepare(self) -> None:
-        for module in (kernels, neighbours, self.kernels.strain.module, self.kernels.force.module):
+        for module in (kernels, neighbours, aging, self.kernels.strain.module, self.kernels.force.module):
             wp.load_module(module if hasattr(module, "__file__") else module.name, device=self.scene.device)
 
     def sort_keys(self) -> Any:

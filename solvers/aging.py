@@ -1,0 +1,76 @@
+"""What every method does to its state when its material cures or grows.
+
+Curing: new bonds form without stress. When moduli change, shear stress and pressure carry over: the elastic tensor is
+relieved in proportion, and the rest volume is taken anew such that the present volume has the present pressure.
+Growth: rest volume grows while the present volume stays, so fresh foam is under pressure and pushes its neighbours.
+"""
+
+import numpy as np
+import warp as wp
+
+from fluidbench.particles import Pool
+from fluidbench.scene import Phase
+
+from . import constitutive
+from .bind import warp_func
+
+wp.set_module_options({"enable_backward": False})
+
+pressure = warp_func(constitutive.pressure)
+relieved = warp_func(constitutive.relieved)
+
+
+@wp.func
+def relieved_tensor(before: Phase, after: Phase, b: wp.vec3, s: wp.vec3):
+    """The elastic tensor (diagonal b, s: xy, xz, yz) that carries the shear stress over to another modulus."""
+    if after.shear_modulus <= 0.0:
+        return wp.vec3(1.0, 1.0, 1.0), wp.vec3(0.0, 0.0, 0.0)
+    ratio = wp.min(before.shear_modulus / after.shear_modulus, 1.0e3)
+    b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = relieved(b[0], b[1], b[2], s[0], s[1], s[2], ratio)
+    return wp.vec3(b_xx, b_yy, b_zz), wp.vec3(b_xy, b_xz, b_yz)
+
+
+@wp.func
+def carried_compression(before: Phase, after: Phase, compression: float):
+    """rho / rho0 - 1 that has the same pressure with another bulk modulus (linear about rest)."""
+    p = pressure(compression, before.bulk_modulus, before.tait, before.tension_limit)
+    return p / after.bulk_modulus
+
+
+@wp.func
+def rest_density(mass: wp.array(dtype=float), volume: wp.array(dtype=float), i: int):
+    """Of a particle that may have grown [kg/m^3]."""
+    return mass[i] / volume[i]
+
+
+def present_density(pool: Pool, volume_ratio: np.ndarray) -> np.ndarray:
+    """m / (V0 J) of every slot, shape (worlds * capacity,) [kg/m^3]; 0 in slots that never held a particle."""
+    return pool.mass.numpy() / np.maximum(pool.volume.numpy() * volume_ratio, 1e-30)
+
+
+@wp.kernel
+def swell(
+    capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), growth: wp.array(dtype=float),
+    # outputs
+    volume: wp.array(dtype=float),
+):  # fmt: skip
+    """Rest volume grows at `growth` [1/s]."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and growth[i] > 0.0:
+        volume[i] = volume[i] * wp.exp(growth[i] * dt[world])
+
+
+@wp.kernel
+def swell_at_volume(
+    capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), growth: wp.array(dtype=float),
+    # outputs
+    volume: wp.array(dtype=float), volume_ratio: wp.array(dtype=float),
+):  # fmt: skip
+    """The same for a method that integrates J: an eigenstrain, the present volume V0 J stays."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and growth[i] > 0.0:
+        factor = wp.exp(growth[i] * dt[world])
+        volume[i] = volume[i] * factor
+        volume_ratio[i] = volume_ratio[i] / factor

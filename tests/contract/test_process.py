@@ -1,0 +1,122 @@
+"""Curing and expansion through every method: mass, momentum, identity, and what a feature that is off costs."""
+
+import numpy as np
+import pytest
+
+from fluidbench.errors import UserError
+from fluidbench.library import validate
+from fluidbench.simulation import Simulation
+from fluidbench.solver import solver_names
+
+METHODS = [m for m in solver_names() if m in ("mpm", "sph", "pbd")]
+
+
+def foam(material, duration=0.2, spacing=0.01, **more):
+    """A small cube of foam floating free, moving and turning."""
+    return validate(
+        {"name": "foam", "domain": {"lower": [-0.2] * 3, "upper": [0.2] * 3}, "duration": duration,
+         "spacing": spacing, "gravity": [0, 0, 0], "tick": duration / 10,
+         "bodies": [{"kind": "box", "center": [0, 0, 0], "size": [0.04] * 3, "velocity": [0.1, 0.05, 0.0],
+                     "angular_velocity": [0, 0, 1.0]}],
+         "material": {"density": 100.0, "youngs_modulus": 2e3, "yield_stress": 20.0, **material}, **more}, "foam",
+    )  # fmt: skip
+
+
+def ran(scenario, method):
+    sim = Simulation(scenario, method)
+    before = sim.frame()
+    outcome = sim.run()
+    assert outcome.verdict == "completed", outcome.reason
+    return before, sim.frame(), sim
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("jitter", [0.0, 0.03])
+@pytest.mark.parametrize("ratio", [1.0, 2.5, 10.0, 30.0])
+def test_growth_conserves_mass_and_reaches_its_volume(method, ratio, jitter):
+    model = {"ratio": ratio, "time": 0.5, "delay": 0.04, "jitter": jitter}
+    before, after, _ = ran(foam({"expansion": model}), method)
+    mass = before["mass"].astype(float).sum()
+    assert after["mass"].astype(float).sum() == pytest.approx(mass, rel=1e-6)
+    grown = after["volume"].astype(float).sum() / before["volume"].astype(float).sum()
+    assert grown == pytest.approx(1 + (ratio - 1) * (1 - np.exp(-0.16 / 0.5)), rel=0.01 if jitter == 0 else 0.05)
+    assert len(np.unique(after["origin"])) == len(after["origin"])
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("jitter", [0.0, 0.03])
+@pytest.mark.parametrize("ratio", [1.0, 2.5, 10.0, 30.0])
+def test_spawning_splits_mass_exactly(method, ratio, jitter):
+    passes = {1.0: 1, 2.5: 3, 10.0: 6, 30.0: 9}[ratio]
+    model = {"kind": "spawn", "ratio": ratio, "passes": passes, "interval": 0.03, "delay": 0.04, "jitter": jitter}
+    before, after, _ = ran(foam({"expansion": model}, duration=0.4), method)
+    assert after["mass"].astype(float).sum() == pytest.approx(before["mass"].astype(float).sum(), rel=1e-6)
+    assert after["volume"].astype(float).sum() == pytest.approx(ratio * before["volume"].astype(float).sum(), rel=1e-5)
+    assert abs(len(after["mass"]) / len(before["mass"]) / ratio - 1) < 0.25
+
+
+def test_the_same_seed_gives_the_same_offspring_for_every_method():
+    model = {"kind": "spawn", "ratio": 2.5, "passes": 3, "interval": 0.01, "delay": 0.04, "jitter": 0.03}
+    litters = [ran(foam({"expansion": model}), method)[1] for method in METHODS]
+    for other in litters[1:]:
+        assert (other["origin"] == litters[0]["origin"]).all()
+        assert other["mass"] == pytest.approx(litters[0]["mass"])
+    fresh = ran(foam({"expansion": model}, seed=1), METHODS[0])[1]
+    assert len(fresh["origin"]) != len(litters[0]["origin"]) or (fresh["origin"] != litters[0]["origin"]).any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_birth_keeps_momentum_and_center(method):
+    model = {"kind": "spawn", "ratio": 2.5, "passes": 3, "delay": 0.04, "impulse": 0.5, "noise": 0.2}
+    sim = Simulation(foam({"expansion": model}), method)
+    before = sim.frame()
+    assert sim.growing is not None
+    sim.growing.advance(0.05, 0.001)
+    after = sim.frame()
+    assert len(after["mass"]) > len(before["mass"])
+    for field in ("velocity", "position"):
+        sums = [(f["mass"].astype(float)[:, None] * f[field]).sum(axis=0) for f in (before, after)]
+        assert sums[1] == pytest.approx(sums[0], abs=1e-6 * float(before["mass"].sum()))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_curing_changes_no_momentum_and_follows_age_alone(method):
+    """Hardening a pool in place leaves position and velocity bit for bit; the level is that of the age, at any tick."""
+    cure = {"kind": "first_order", "rate": 5.0, "delay": 0.02, "youngs_modulus": 2e4, "yield_stress": 2e3}
+    sim = Simulation(foam({"cure": cure}), method)
+    sim.run()
+    before = sim.frame()
+    assert sim.curing is not None
+    sim.curing.advance(0.6)
+    after = sim.frame()
+    assert (after["velocity"] == before["velocity"]).all() and (after["position"] == before["position"]).all()
+    assert (after["phase"] > before["phase"]).all()
+    expected = round(100 * (1 - np.exp(-5.0 * 0.58)))
+    assert set(after["phase"].tolist()) <= {expected - 1, expected, expected + 1}
+    fine = ran(foam({"cure": cure}, tick=0.005), method)[1]
+    assert abs(int(fine["phase"][0]) - int(before["phase"][0])) <= 8  # the last tick's start
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_step_follows_the_stiffest_material_that_can_be_there(method):
+    cure = {"kind": "jump", "delay": 0.1, "youngs_modulus": 2e5, "yield_stress": 2e4}
+    sim = Simulation(foam({"cure": cure}), method)
+    early = min(b.dt for b in sim.bounds())
+    while sim.done < sim.ticks:
+        sim.advance()
+    late = min(b.dt for b in sim.bounds())
+    assert late < 0.3 * early if method != "pbd" else late <= early
+
+
+def test_lists_that_children_would_overfill_are_refused():
+    model = {"kind": "spawn", "ratio": 10.0}
+    for method in ("sph", "pbd"):
+        with pytest.raises(UserError, match="passes = 6 or more"):
+            Simulation(foam({"expansion": model}), method)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_feature_that_is_off_allocates_nothing(method):
+    plain = Simulation(foam({}), method)
+    assert plain.curing is None and plain.growing is None
+    assert not {"growth", "generation"} & set(plain.pool.fields)
