@@ -80,7 +80,3 @@ class Expansion(BaseModel):
     def generations(self, fill: float) -> int:
         """growth: how often a particle of `fill` times spacing^3 will have split in the end."""
         return max(0, math.ceil(math.log2(self.ratio * fill / LARGEST) - 1e-9)) if self.split else 0
-
-    def offspring(self, fill: float) -> float:
-        """Expected particles at the end for each one emitted, of `fill` times spacing^3."""
-        return self.ratio if self.kind == "spawn" else 2.0 ** self.generations(fill)

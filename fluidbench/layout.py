@@ -50,6 +50,16 @@ def emitted(scenario: Scenario) -> int:
     return sum(count for count, _ in sources(scenario))
 
 
+def generations(scenario: Scenario) -> int:
+    """How often a particle and its offspring may split or spawn in a row."""
+    model = scenario.material.expansion
+    if model is None:
+        return 0
+    if model.kind == "spawn":
+        return model.passes
+    return max(model.generations(volume / scenario.spacing**3) for _, volume in sources(scenario))
+
+
 def capacity_of(scenario: Scenario) -> int:
     """Particles to preallocate: the scenario's `pool`, or what it will ever hold (six standard deviations above the
     mean where offspring come by chance).
@@ -58,9 +68,9 @@ def capacity_of(scenario: Scenario) -> int:
     """
     need, model = emitted(scenario), scenario.material.expansion
     if model is not None:
-        expected = sum(count * model.offspring(volume / scenario.spacing**3) for count, volume in sources(scenario))
         certain = model.kind == "growth" or model.per_pass == int(model.per_pass)
-        need = math.ceil(expected if certain else expected + 6.0 * model.ratio * math.sqrt(need))
+        expected = need * (2.0 ** generations(scenario) if model.kind == "growth" else model.ratio)
+        need = math.ceil(expected - 1e-9 if certain else expected + 6.0 * model.ratio * math.sqrt(need))
     if scenario.pool is not None and scenario.pool < need:
         raise UserError(f"pool = {scenario.pool} is too small: {scenario.name} will hold up to {need} particles")
     return scenario.pool or need

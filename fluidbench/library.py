@@ -31,14 +31,21 @@ def find(reference: str | Path) -> Path:
     return known[str(reference)]
 
 
-def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = None) -> Scenario:
+def load(
+    reference: str | Path, overrides: dict[str, Any] | list[str] | None = None, quick: bool = False
+) -> Scenario:  # fmt: skip
     """Read a scenario and apply overrides such as {"material.yield_stress": 50} or ["material.yield_stress=50"].
+
+    `quick` merges the file's own [quick] table first; a file without one gets a third more spacing.
 
     Raises UserError naming the file and key of whatever is wrong.
     """
     path = find(reference)
     table = _read(path, ())
     table.setdefault("name", path.stem)
+    shorter = table.pop("quick", None)
+    if quick:
+        table = _merge(table, shorter) if shorter is not None else table | {"spacing": 4 / 3 * table.get("spacing", 0)}
     if isinstance(overrides, list):
         overrides = dict(parse_override(text) for text in overrides)
     for key, value in (overrides or {}).items():

@@ -100,6 +100,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     quiet_warp()
     from .measure.ledger import final_lengths, ledger, lengths
     from .measure.reference import answers
+    from .measure.tower import is_tower, success
     from .simulation import Simulation, Verdict
     from .solver import approximations, get_solver
 
@@ -131,6 +132,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         "verdict": str(outcome.verdict), "reason": outcome.reason,
         "measures": final,
         "answers": [asdict(a) for a in answers(scenario, series, final)] if complete else [],
+        "success": success(scenario, final, series) if complete and is_tower(scenario) else [],
         "cost": cost(outcome, simulation, time.perf_counter() - start),
         "bounds_s": {b.name: b.dt for b in simulation.bounds()},
         "binding_s": outcome.binding,

@@ -12,7 +12,7 @@ import warp as wp
 from . import health
 from .errors import UserError
 from .health import Health, Vital
-from .layout import capacity_of, emitted, sample
+from .layout import capacity_of, emitted, generations, sample
 from .particles import CLAMPED, FREE, OutOfCapacity, Pool
 from .process import curing, emission, expansion
 from .process.curing import Curing
@@ -79,7 +79,8 @@ class Simulation:
         self.emission = Emission(self.scene, self.pool) if self.scenario.nozzle is not None else None
         material = self.scenario.material
         growing = material.expansion is not None
-        self.growing = Growing(self.scene, self.pool, emitted(self.scenario)) if growing else None
+        family = (emitted(self.scenario), generations(self.scenario)) if growing else ()
+        self.growing = Growing(self.scene, self.pool, *family) if growing else None
         self.solver = solver_class(self.scene, self.pool, self.config, backend)
         self.curing = Curing(self.scene, self.pool, self.solver.harden) if material.cure is not None else None
         self.health = Health(self.scene, self.pool)

@@ -24,11 +24,11 @@ WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what can
 Frames = Annotated[bool, typer.Option("--frames", help="keep a snapshot of every output, not only of the last")]
 
 
-def load_scenario(name: str, settings: list[str] | None, spacing: float | None) -> "Scenario":
+def load_scenario(name: str, settings: list[str] | None, spacing: float | None, quick: bool = False) -> "Scenario":
     from ..library import load
 
     extra = [f"spacing={spacing!r}"] if spacing is not None else []
-    return load(name, [*(settings or []), *extra])
+    return load(name, [*(settings or []), *extra], quick)
 
 
 def split(text: str) -> list[str]:

@@ -23,6 +23,8 @@ from .app import (
 if TYPE_CHECKING:
     from ..study.execute import Finished
 
+Quick = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter and coarser version")]
+
 
 @app.command()
 def compare(
@@ -35,12 +37,13 @@ def compare(
     out: Out = None,
     wall_limit: WallLimit = 900.0,
     frames: Frames = False,
+    quick: Quick = False,
 ) -> None:
     """Run one scenario through several methods and put fidelity and cost side by side.
 
     A second call with the same inputs reuses the runs that are finished.
     """
-    _study(scenario, solvers, set_, spacing, repeats, device, out, wall_limit, frames)
+    _study(scenario, solvers, set_, spacing, repeats, device, out, wall_limit, frames, quick)
 
 
 @app.command()
@@ -53,9 +56,10 @@ def run(
     out: Out = None,
     wall_limit: WallLimit = 900.0,
     frames: Frames = False,
+    quick: Quick = False,
 ) -> None:
     """Run one scenario through one method."""
-    _study(scenario, solver, set_, spacing, 1, device, out, wall_limit, frames)
+    _study(scenario, solver, set_, spacing, 1, device, out, wall_limit, frames, quick)
 
 
 @app.command()
@@ -122,7 +126,7 @@ def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None
 
 def _study(
     name: str, solvers: str, settings: list[str] | None, spacing: float | None, repeats: int, device: str,
-    out: Path | None, wall_limit: float, frames: bool,
+    out: Path | None, wall_limit: float, frames: bool, quick: bool,
 ) -> None:  # fmt: skip
     """compare and run: everything is checked before anything is written."""
     from rich.console import Console
@@ -131,7 +135,7 @@ def _study(
     from ..store import Store
     from ..study.compare import jobs
 
-    scenario = load_scenario(name, settings, spacing)
+    scenario = load_scenario(name, settings, spacing, quick)
     methods = split(solvers) or solver_names()
     planned = jobs(scenario, methods, repeats, device, "warp", wall_limit, frames)
     check_device(device)
@@ -173,14 +177,15 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
     """Tables in the terminal; figures, tables and the page in the folder."""
     from ..report.figures import draw, draw_views
     from ..report.html import write_page
-    from ..report.tables import against_reference, costs, fidelity
+    from ..report.tables import against_reference, costs, fidelity, successes
     from ..report.tables import show as print_table
     from ..report.traces import plots
     from ..study.compare import tidy, write_tables
     from ..study.execute import ADVICE
 
     write_tables(tidy(results), root)
-    tables = [t for t in (fidelity(results), against_reference(results), costs(results)) if t is not None]
+    made = (fidelity(results), successes(results), against_reference(results), costs(results))
+    tables = [table for table in made if table is not None]
     drawn = plots(results)
     views = draw_views(results, root)
     for plot in drawn:

@@ -50,8 +50,12 @@ def measure_bead(deposit: Deposit, scenario: Scenario) -> Bead | None:
     leg = np.clip(np.searchsorted(knots, station, side="right") - 1, 0, len(legs) - 1)
     points = np.stack([np.interp(station, knots, corners[:, i]) for i in range(2)], axis=1)
     height = deposit.origin[2] + deposit.fill.shape[2] * deposit.spacing - scenario.domain.lower[2]
+    expansion = scenario.material.expansion
+    reach = 2.5 * nozzle.diameter * (1.0 if expansion is None else expansion.ratio ** (1 / 3))
+    if path.kind == "ring" and path.radius is not None:
+        reach = min(reach, path.radius)  # not as far as the other side
     sections = [
-        cut(deposit, p, legs[i] / lengths[i], 2.5 * nozzle.diameter, height, scenario.domain.lower[2])
+        cut(deposit, p, legs[i] / lengths[i], reach, height, scenario.domain.lower[2])
         for p, i in zip(points, leg, strict=True)
     ]
     columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area"))

@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from ..layout import emitted
 from ..particles import CARRIED
 from ..scenario import Scenario
 from .bead import layer_heights, measure_bead
 from .deposit import Deposit
 from .slump import measure_slump
+from .tower import family_spread, is_tower, measure_tower, progress
 
 Frame = dict[str, np.ndarray]
 
@@ -38,19 +40,23 @@ def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     deposit = deposit_of(frame, scenario)
     row = {"resolution_m": deposit.spacing, "top_m": deposit.top() - scenario.domain.lower[2]}
     row |= measure_slump(deposit, scenario)
-    return row
+    return row | progress(frame, scenario)
 
 
 def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """`lengths` and what only the finished print shows: beads and layers."""
     row = lengths(frame, scenario)
+    free = frame["held"] != CARRIED
     bead = measure_bead(deposit_of(frame, scenario), scenario)
     if bead is not None and scenario.toolpath is not None:
         row |= bead.summary(scenario.toolpath.layers)
-        free = frame["held"] != CARRIED
         for i, rise in enumerate(layer_heights(frame["position"][free], frame["birth_time"][free], scenario), 2):
             row[f"layer_{i}_height_m"] = rise
         if scenario.toolpath.kind == "ring" and scenario.toolpath.center is not None:
             center = np.average(frame["position"][free, :2], axis=0, weights=frame["mass"][free])
             row["ring_drift_m"] = float(np.hypot(*(center - scenario.toolpath.center)))
+    if is_tower(scenario):
+        row |= measure_tower(frame, scenario)
+    if scenario.material.expansion is not None:
+        row["family_spread_m"] = family_spread(frame, emitted(scenario))
     return row

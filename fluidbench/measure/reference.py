@@ -62,9 +62,13 @@ def _emission(scenario: Scenario, series: pd.DataFrame, final: dict[str, float])
         Answer("emitted mass [kg]", final["mass_kg"], expected, abs(off) / disc, "in discs of one spacing", "rho Q t")
     ]
     if "bead_area_m2" in final:
-        area = nozzle.rate / path.speed
+        area, source = nozzle.rate / path.speed, "Q / V"
+        if (expansion := scenario.material.expansion) is not None:
+            ages = t - np.linspace(0.0, track.end, 200)[track.velocity(np.linspace(0.0, track.end, 200)).any(axis=1)]
+            area *= float(np.mean([expansion.volume_ratio(age) for age in ages]))
+            source = "R Q / V"
         got = final["bead_area_m2"]
-        found.append(Answer("bead area [m^2]", got, area, abs(got / area - 1.0), "relative", "Q / V"))
+        found.append(Answer("bead area [m^2]", got, area, abs(got / area - 1.0), "relative", source))
     return found
 
 

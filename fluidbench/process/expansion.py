@@ -33,7 +33,7 @@ class Brood:
     delay: float
     jitter: float
     interval: float
-    passes: int
+    passes: int  # births of a particle, at most
     limit: float  # volume beyond which a particle splits [m^3]
     spacing: float
     radius: float  # of the ball, over the edge of the expanded volume
@@ -84,7 +84,7 @@ def conceive(
         children = int(0)
         if held[i] != CARRIED:
             if brood.splits == 1:
-                if volume[i] > brood.limit:
+                if volume[i] > brood.limit and generation[i] < brood.passes:
                     children = 2
             elif generation[i] < brood.passes:
                 draw = uniform(chance, origin[i] % brood.first_range, 0, 0)
@@ -191,17 +191,18 @@ def most_children(brood: Brood):
 class Growing:
     """Expands a pool by its scenario's schedule, once a tick.
 
-    `ancestors` is how many particles the scenario has without offspring. Raises OutOfCapacity when children find no
+    `ancestors` is how many particles the scenario has without offspring, `generations` how often one of them may give
+    birth. Raises OutOfCapacity when children find no
     room.
     """
 
-    def __init__(self, scene: Scene, pool: Pool, ancestors: int) -> None:
+    def __init__(self, scene: Scene, pool: Pool, ancestors: int, generations: int) -> None:
         model = scene.scenario.material.expansion
         assert model is not None
         self.scene, self.pool, self.model = scene, pool, model
         self.chance = chance_of(scene.scenario.seed, "expansion")
         self.ancestors = ancestors
-        self.brood = self._brood(model)
+        self.brood = self._brood(model, generations)
         self.births = model.kind == "spawn" or model.split
         if model.kind == "growth":
             pool.add_field("growth", float)
@@ -214,13 +215,13 @@ class Growing:
                 self.born = wp.zeros(pool.worlds, dtype=int)
                 self.old = wp.zeros(pool.worlds, dtype=int)
 
-    def _brood(self, model: Expansion) -> Brood:
+    def _brood(self, model: Expansion, generations: int) -> Brood:
         d = self.scene.spacing
         brood = Brood()
         brood.splits = int(model.kind == "growth")
         brood.ratio = 1.0 if model.kind == "growth" else model.per_pass
         brood.delay, brood.jitter, brood.interval = model.delay, model.jitter, model.interval
-        brood.passes, brood.limit, brood.spacing = model.passes, LARGEST * d**3, d
+        brood.passes, brood.limit, brood.spacing = generations, LARGEST * d**3, d
         brood.radius, brood.impulse, brood.noise = model.radius, model.impulse, model.noise
         brood.margin, brood.first_range = model.margin * d, self.ancestors
         return brood

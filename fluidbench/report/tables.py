@@ -96,6 +96,19 @@ def against_reference(results: Sequence[Finished]) -> Table | None:
     return table if table.rows else None
 
 
+def successes(results: Sequence[Finished]) -> Table | None:
+    """The criteria of a print, one row each, a column a method; None where the scenario has none."""
+    done = [r for r in results if r.record.get("success") and r.record["repeat"] == 0]
+    if not done:
+        return None
+    table = Table("Success, each criterion alone", ["", "wanted", *[r.label for r in done]])
+    for i, first in enumerate(done[0].record["success"]):
+        cells = [r.record["success"][i] for r in done]
+        shown = [f"{number(c['measured'])} {'yes' if c['met'] else 'NO'}" for c in cells]
+        table.rows.append([first["name"], first["wanted"], *shown])
+    return table
+
+
 def costs(results: Sequence[Finished]) -> Table:
     """What it cost, compilation apart."""
     groups = {n: [r for r in g if "cost" in r] for n, g in by_method(results).items()}

@@ -54,7 +54,7 @@ def lengths_of(record: dict[str, Any]) -> dict[str, float]:
     """The lengths, areas and slumps of a finished run: what a printer cares about."""
     wanted = ("bead_width_m", "bead_height_m", "bead_area_m2", "slump", "spread_radius_m", "front_x_m", "height_m")
     measures = record.get("measures", {})
-    layers = [key for key in measures if key.startswith("layer_")]
+    layers = [key for key in measures if key.startswith("layer_") and key.endswith(("height_m", "width_m", "radius_m"))]
     return {key: float(measures[key]) for key in (*wanted, *layers) if math.isfinite(measures.get(key, math.nan))}
 
 

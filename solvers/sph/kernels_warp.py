@@ -153,6 +153,8 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
             new_density[i] = rho
             p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
             scale = 1.0 / (rho * rho)
+            if wp.static(changing):
+                scale = 1.0  # partners of another density: see `force`
             if wp.static(strength):
                 b = elastic_normal[i]
                 s = elastic_shear[i]
@@ -230,7 +232,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     other_phase = phases[world, phase_of[j]]
                     other_rest = rest_density(mass, volume, j)
                     fast = shock + other_phase.wave_speed * wp.sqrt(other_phase.density / other_rest)
-                    rubs = num.artificial_viscosity * num.h * fast / (rho + density[j])
+                    rubs = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(rho, density[j])
                     thin = phase.viscosity * other_phase.viscosity
                     thin *= 2.0 / wp.max(phase.viscosity + other_phase.viscosity, 1.0e-30)
                     flows = 10.0 * num.viscous_lattice * thin / (rest * other_rest)
@@ -255,6 +257,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     if code > 0:
                         other = mirrored_stress(box, other, code)
                     other += own_stress
+                    if wp.static(changing):
+                        # (sigma_i + sigma_j) / (rho_i rho_j): light matter must not feel its heavy partner's mass
+                        other *= 1.0 / (rho * density[j])
                     push = other * r
                     # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
                     tension = wp.trace(other) / 3.0
@@ -262,7 +267,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                         ratio = kernel(q, num.h) * inv_w
                         scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio
                 else:
-                    scalar -= own + load[j]
+                    both = own + load[j]
+                    if wp.static(changing):
+                        both *= 1.0 / (rho * density[j])
+                    scalar -= both
                 push = f * (push + scalar * r)
                 if code > 0:
                     for axis in range(3):
