@@ -134,6 +134,11 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         "answers": [asdict(a) for a in answers(scenario, series, final)] if complete else [],
         "success": success(scenario, final, series) if complete and is_tower(scenario) else [],
         "cost": cost(outcome, simulation, time.perf_counter() - start),
+        "launches": {
+            "per_substep": simulation.substep_launches.count,
+            "process_per_tick": simulation.process_launches.count / max(outcome.ticks, 1),
+        },
+        "bytes": simulation.footprint(),
         "bounds_s": {b.name: b.dt for b in simulation.bounds()},
         "binding_s": outcome.binding,
         "approximations": approximations(solver, scenario, simulation.config),
@@ -159,7 +164,7 @@ def save(path: Path, frame: dict[str, Any], time: float) -> None:
 def cost(outcome: Any, simulation: Any, total: float) -> dict[str, float]:
     """What a run cost, compilation apart; rates are of the loop alone, measurements and output not included."""
     wall, cpu = max(outcome.wall, 1e-9), max(outcome.cpu, 1e-9)
-    bytes_used = sum(simulation.pool.footprint().values()) + sum(simulation.solver.footprint().values())
+    bytes_used = sum(simulation.footprint().values())
     row = {
         "simulated_s": outcome.time,
         "wall_s": outcome.wall,

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from .body import CORNERS, Body, Matrix, Model, Vector
+from .collider import Collider
 from .material import Material, NonNegative, Positive
 from .toolpath import Toolpath, Track
 
@@ -116,6 +117,7 @@ class Scenario(Model):
     body_force_center: Vector = Field((0.0, 0.0, 0.0), description="where the gradient adds nothing [m]")
     nozzle: Nozzle | None = None
     toolpath: Toolpath | None = None
+    collider: Collider | None = Field(None, description="a rigid body carried along the toolpath")
     bodies: tuple[Body, ...] = ()
     duration: Positive = Field(description="simulated time [s]")
     output_interval: Positive | None = Field(None, description="time between outputs [s]; default duration / 20")
@@ -134,6 +136,7 @@ class Scenario(Model):
     def _consistent(self) -> "Scenario":
         for check in (
             self._check_source, self._check_nozzle, self._check_bodies, self._check_periodic, self._check_force,
+            self._check_collider,
         ):  # fmt: skip
             check()
         return self
@@ -183,6 +186,24 @@ class Scenario(Model):
     def _check_force(self) -> None:
         if self.body_force_gradient is not None and not np.allclose(self.gradient, self.gradient.T):
             raise ValueError("body_force_gradient must be symmetric: only then has the force a potential")
+
+    def _check_collider(self) -> None:
+        if self.collider is None:
+            return
+        if self.track is None or self.nozzle is None:
+            raise ValueError("collider: it is carried along the toolpath; give nozzle and toolpath")
+        start, r = self.track.at(0.0), self.nozzle.diameter / 2
+        for i, body in enumerate(self.bodies):
+            low, high = np.asarray(body.center) - body.extent, np.asarray(body.center) + body.extent
+            grid = [np.linspace(a, b, 9) for a, b in zip(low, high, strict=True)]
+            points = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 3)
+            if (self.collider.distance(points - start) < 0).any():
+                raise ValueError(f"collider: it starts inside bodies.{i}; raise collider.clearance or move the body")
+        jet = np.array(
+            [[x, y, z] for x in (-r, 0, r) for y in (-r, 0, r) for z in np.linspace(-self.nozzle.standoff, 0, 9)]
+        )
+        if (self.collider.distance(jet) < 0).any():
+            raise ValueError("collider: it starts inside the material that leaves the nozzle; raise collider.clearance")
 
     @cached_property
     def track(self) -> Track | None:

@@ -10,11 +10,13 @@ import numpy as np
 import warp as wp
 
 from . import health
+from .device import CountedLaunches
 from .errors import UserError
 from .health import Health, Vital
 from .layout import capacity_of, emitted, generations, sample
 from .particles import CLAMPED, FREE, OutOfCapacity, Pool
-from .process import curing, emission, expansion
+from .process import contact, curing, emission, expansion
+from .process.contact import Contact
 from .process.curing import Curing
 from .process.emission import Emission
 from .process.expansion import Growing
@@ -83,6 +85,7 @@ class Simulation:
         self.growing = Growing(self.scene, self.pool, *family) if growing else None
         self.solver = solver_class(self.scene, self.pool, self.config, backend)
         self.curing = Curing(self.scene, self.pool, self.solver.harden) if material.cure is not None else None
+        self.contact = Contact(self.scene, self.pool) if self.scenario.collider is not None else None
         self.health = Health(self.scene, self.pool)
         self._demands = [Demands(solver_class, s, self.config) for s in self.scene.scenarios]
         self.tick, self.ticks, self.ticks_per_output = self.scenario.schedule
@@ -91,6 +94,7 @@ class Simulation:
         self._identity = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
         self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
         self._graphs: dict[int, Any] = {}
+        self.substep_launches, self.process_launches = CountedLaunches(), CountedLaunches()
         self._use_graphs = graphs
 
     @property
@@ -108,13 +112,14 @@ class Simulation:
         """Compile and load every kernel."""
         self.solver.prepare()
         wp.load_module(health, device=self.scene.device)
-        parts = {emission: self.emission, curing: self.curing, expansion: self.growing}
+        parts = {emission: self.emission, curing: self.curing, expansion: self.growing, contact: self.contact}
         for module in (module for module, part in parts.items() if part is not None):
             wp.load_module(module, device=self.scene.device)
 
     def advance(self) -> Plan:
         """One tick: feed, plan, and run its substeps."""
-        self._age()
+        with self.process_launches:
+            self._age()
         if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
             self.reorder(keys)
         self._refresh()
@@ -132,6 +137,8 @@ class Simulation:
             self.growing.advance(self.now, self.tick)
         if self.curing is not None:
             self.curing.advance(self.now)
+        if self.contact is not None:
+            self.contact.advance(self.now, self.tick)
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
@@ -163,20 +170,37 @@ class Simulation:
         wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
         self.pool.permute(self._order)
 
+    def _substep(self) -> None:
+        """Everything of one substep, as it is captured."""
+        self.solver.substep()
+        if self.contact is not None:
+            self.contact.substep()
+
     def _run(self, substeps: int) -> None:
         """Replay `substeps` substeps: one graph a substep on the CPU, where replay is free, one for all on CUDA."""
         if not self._use_graphs:
             for _ in range(substeps):
-                self.solver.substep()
+                self._substep()
             return
         each = 1 if self.scene.device.is_cpu else substeps
         if each not in self._graphs:
-            with wp.ScopedCapture(device=self.scene.device) as capture:
+            self.substep_launches = CountedLaunches()
+            with self.substep_launches, wp.ScopedCapture(device=self.scene.device) as capture:
                 for _ in range(each):
-                    self.solver.substep()
+                    self._substep()
+            self.substep_launches.count //= each
             self._graphs[each] = capture.graph
         for _ in range(substeps // each):
             wp.capture_launch(self._graphs[each])
+
+    def footprint(self) -> dict[str, int]:
+        """Bytes by part of everything allocated: the pool, the method, and each process that is on."""
+        owners = {"pool": self.pool, "solver": self.solver, "curing": self.curing, "expansion": self.growing,
+                  "contact": self.contact}  # fmt: skip
+        return {
+            f"{owner}.{name}": size
+            for owner, part in owners.items() if part is not None for name, size in part.footprint().items()
+        }  # fmt: skip
 
     def fault(self) -> str | None:
         """What a kernel could not do, in the solver's words."""

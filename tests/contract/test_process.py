@@ -117,6 +117,57 @@ def test_lists_that_children_would_overfill_are_refused():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_feature_that_is_off_allocates_nothing(method):
-    plain = Simulation(foam({}), method)
-    assert plain.curing is None and plain.growing is None
+    cure = {"delay": 0.1, "youngs_modulus": 2e4}
+    variants = {"plain": {}, "curing": {"cure": cure}, "expansion": {"expansion": {"ratio": 2.0}}}
+    made = {name: Simulation(foam(material), method) for name, material in variants.items()}
+    plain = made["plain"]
+    assert plain.curing is None and plain.growing is None and plain.contact is None
     assert not {"growth", "generation"} & set(plain.pool.fields)
+    for sim in made.values():
+        sim.advance()
+    assert plain.process_launches.count == 0
+    assert made["curing"].process_launches.count >= 2 and made["expansion"].process_launches.count >= 2
+    assert made["expansion"].substep_launches.count > plain.substep_launches.count
+    assert not [name for name in plain.footprint() if name.startswith(("curing", "expansion", "contact"))]
+
+
+def under_a_hammer(method, friction):
+    """A block of paste; a box that sweeps over it at 0.2 m/s with the nozzle."""
+    return validate(
+        {"name": "hammer", "domain": {"lower": [-0.2, -0.1, 0.0], "upper": [0.2, 0.1, 0.2]}, "duration": 0.8,
+         "spacing": 0.01, "material": {"density": 1000.0, "youngs_modulus": 2e4, "yield_stress": 200.0},
+         "bodies": [{"kind": "box", "center": [0.05, 0, 0.03], "size": [0.06, 0.06, 0.06]}],
+         "nozzle": {"diameter": 0.02, "exit_speed": 1e-3, "standoff": 0.05},
+         "toolpath": {"start": [-0.1, 0.0], "end": [0.1, 0.0], "speed": 0.2},
+         "collider": {"parts": [{"kind": "box", "center": [0, 0.06, 0.0], "size": [0.04, 0.08, 0.04]}],
+                      "friction": friction}}, "hammer",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_collider_pushes_what_it_meets_and_nothing_else(method):
+    sim = Simulation(under_a_hammer(method, 0.3), method)
+    rest = sim.frame()
+    outcome = sim.run()
+    assert outcome.verdict == "completed", outcome.reason
+    after, scenario = sim.frame(), sim.scenario
+    body = after["held"] == 0
+    assert scenario.collider is not None and scenario.track is not None
+    inside = scenario.collider.distance(after["position"][body] - scenario.track.at(sim.now))
+    assert inside.min() > -1.0 * scenario.spacing
+    n = len(rest["position"])
+    pushed = after["position"][:n, 0] - rest["position"][:, 0]
+    met = rest["position"][:, 1] > 0.022
+    assert pushed[met & (rest["position"][:, 2] > 0.03)].mean() > 0.005
+    assert np.abs(pushed[rest["position"][:, 1] < -0.015]).mean() < 0.3 * pushed[met].mean()
+
+
+def test_a_collider_inside_the_material_or_the_jet_is_refused():
+    table = under_a_hammer("mpm", 0.3).model_dump(mode="json", exclude_none=True)
+    for center, words in (
+        ([0.12, 0.0, 0.0], "starts inside bodies.0"),
+        ([0.0, 0.0, 0.0], "starts inside the material"),
+    ):
+        table["collider"]["parts"] = [{"kind": "sphere", "center": center, "radius": 0.03}]
+        with pytest.raises(UserError, match=words):
+            validate(table, "hammer")
