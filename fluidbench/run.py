@@ -36,10 +36,12 @@ class Job:
     repeat: int = 0
     wall_limit: float | None = None
     keep_frames: bool = False
+    film_every: float | None = None
 
     def inputs(self) -> dict[str, Any]:
         """What names the run; how long it may take does not."""
-        return {k: v for k, v in asdict(self).items() if k not in ("wall_limit",)}
+        unused = {"film_every"} if self.film_every is None else set()
+        return {k: v for k, v in asdict(self).items() if k not in {"wall_limit", *unused}}
 
 
 def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | None = None) -> dict[str, Any]:
@@ -119,7 +121,13 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
             save(folder / f"frame_{len(rows) - 1:04d}.npz", frame, sim.now)
         report({"time": sim.now, "until": scenario.duration, "speed": vital.speed})
 
+    if job.film_every is not None:
+        from .report.film import Film
+
+        simulation.film = Film(folder / "film", job.scenario, job.film_every)
     outcome = simulation.run(observe, job.wall_limit)
+    if simulation.film is not None:
+        simulation.film.close()
     frame = simulation.frame()
     series = pd.DataFrame(rows)
     series.to_parquet(folder / "series.parquet")

@@ -91,6 +91,7 @@ class Simulation:
         self.tick, self.ticks, self.ticks_per_output = self.scenario.schedule
         self.speed = self.scenario.reference_speed
         self.done = 0
+        self.film: Any = None  # takes pictures on the way: due(time), shoot(simulation)
         self._identity = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
         self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
         self._graphs: dict[int, Any] = {}
@@ -234,6 +235,8 @@ class Simulation:
             steps = self.advance()
             at_output = self.done % self.ticks_per_output == 0 or self.done == self.ticks
             vital = self.look() if self.done % every == 0 or at_output else None
+            if self.film is not None and self.film.due(self.now):
+                self.film.shoot(self)
         except OutOfCapacity as error:
             outcome.verdict, outcome.reason = Verdict.OUT_OF_CAPACITY, str(error)
             return

@@ -1,4 +1,4 @@
-"""stability, ablate, select and table1: studies made of many runs."""
+"""stability, ablate, select, table1 and table2: studies made of many runs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -221,3 +221,30 @@ def table1(
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
         evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, device, wall_limit)
     _publish(report(evidence, store.root), store.root)
+
+
+@app.command()
+def table2(
+    solvers: Solvers = "mpm",
+    pools: Annotated[str, typer.Option(help="pool sizes to preallocate; `fit` is as many as needed")] = "fit,298000",
+    repeats: Annotated[int, typer.Option(min=1, help="runs of each row, without and with pictures")] = 5,
+    quick: Quick = False,
+    device: Device = "cpu",
+    out: Out = None,
+    wall_limit: WallLimit = 1800.0,
+) -> None:
+    """Time the printed tower, feature by feature, with and without pictures; the paper's claims as verdicts.
+
+    A second call reuses the runs that are finished.
+    """
+    from ..report.table2 import report
+    from ..study.execute import Hooks
+    from ..study.table2 import VARIANTS
+    from ..study.table2 import table2 as study
+
+    methods, store, _ = _prepare(solvers, device, out, "table2", 1)
+    sizes = [None if part == "fit" else int(part) for part in split(pools)]
+    with _watch("table2", 2 * repeats * len(VARIANTS) * len(methods) * len(sizes)) as tell:
+        hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
+        rows = study(methods, sizes, repeats, quick, store, hooks, device, wall_limit)
+    _publish(report(rows, store.root), store.root)

@@ -117,8 +117,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 partner = density[j]
                 if wp.static(changing):
                     # in volumes and compressions: partners may be at rest at another density
-                    w *= rest / rest_density(mass, volume, j)
-                    partner *= rest / rest_density(mass, volume, j)
+                    share = rest / rest_density(mass, volume, j)
+                    w *= share
+                    partner *= share
+                    lifts *= share
                 spread += w * (rho - partner - wp.dot(own_lift + lifts, r))
                 second -= w * wp.dot(r, r)
                 lean += w * r

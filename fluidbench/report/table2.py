@@ -1,0 +1,47 @@
+"""What `table2` shows: the paper's rows with its figure beside ours, and its claims as verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import mean
+
+from ..study.table2 import PAPER, Row, claims, spread
+from .study import Report, record_link
+from .tables import Table
+
+
+def report(rows: Sequence[Row], root: Path) -> Report:
+    import pandas as pd
+
+    table = Table("Table II", ["variant", "method", "pool", "particles", "dt [ms]", "steps/s", "simulated/real",
+                               "steps/s, pictures", "simulated/real, pictures", "paper: steps/s"])  # fmt: skip
+    data, runs = [], {}
+    for row in rows:
+        done = [r.record for r in row.bare if r.ok]
+        verdicts = ", ".join(sorted({r.record["verdict"] for r in [*row.bare, *row.filmed] if not r.ok}))
+        cost = done[0]["cost"] if done else {}
+        pool = str(row.pool or "as needed")
+        table.rows.append([
+            row.variant, row.method, pool, str(cost.get("peak_particles", "-")),
+            f"{1e3 * cost['mean_dt_s']:.3g}" if cost else "-", spread(row.speed()) if done else verdicts,
+            spread(row.pace()), spread(row.speed(True)), spread(row.pace(True)), f"{PAPER.get(row.variant, 0) or '-'}",
+        ])  # fmt: skip
+        data.append({
+            "variant": row.variant, "method": row.method, "pool": row.pool, "verdicts": verdicts,
+            "steps_per_s": mean(row.speed()) if done else None, "simulated_to_real": mean(row.pace()) if done else None,
+            "steps_per_s_pictures": mean(row.speed(True)) if row.speed(True) else None, "repeats": len(done),
+            "launches_per_substep": done[0]["launches"]["per_substep"] if done else None,
+            "bytes": sum(done[0]["bytes"].values()) if done else None,
+        })  # fmt: skip
+        runs[f"{row.variant}, {row.method}, pool {pool}"] = [record_link(r, root) for r in [*row.bare, *row.filmed]]
+    verdicts = Table("The paper's claims", ["method", "claim", "measured", "verdict"])
+    verdicts.rows.extend(list(claim) for claim in claims(rows))
+    findings = [f"{m}: '{claim}': {verdict}. {measured}." for m, claim, measured, verdict in claims(rows)]
+    every = [r.record for row in rows for r in row.bare if "machine" in r.record]
+    machine = "; ".join(f"{k} {v}" for k, v in every[0]["machine"].items()) if every else ""
+    return Report(
+        "table2", "fluidbench table2: the printed tower, feature by feature",
+        "Steps a second and simulated over real time, mean ± standard deviation of the repeats.", findings,
+        [table, verdicts], pd.DataFrame(data), [], runs, machine,
+    )  # fmt: skip

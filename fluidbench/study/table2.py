@@ -1,0 +1,110 @@
+"""`table2`: the published timing of a printed tower, feature by feature, with and without pictures taken on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import mean, stdev
+
+from ..library import load
+from ..run import Job
+from ..store import Store
+from .execute import Finished, Hooks, execute
+from .verdicts import CONFIRMED, EFFECT, OPEN, REFUTED
+
+VARIANTS = {
+    "plain": "ring_tower", "curing": "ring_tower_curing", "expansion": "ring_tower_expansion",
+    "expansion + curing": "ring_tower_expansion_curing", "expansion + curing + drone": "ring_tower_drone",
+}  # fmt: skip
+PAPER = {"expansion + curing + drone": 60.0}  # steps/s on an RTX 5090; the other rows are not in our sources
+PICTURE = 0.033  # simulated time between pictures [s]
+SAME, BOTTLENECK = 1.2, 0.5
+
+
+@dataclass
+class Row:
+    """A variant in a pool, through one method: its repeats without and with pictures."""
+
+    variant: str
+    pool: int | None
+    method: str
+    bare: list[Finished]
+    filmed: list[Finished]
+
+    def speed(self, filmed: bool = False) -> list[float]:
+        """Steps a second of every completed repeat."""
+        runs = self.filmed if filmed else self.bare
+        return [r.record["cost"]["steps_per_s"] for r in runs if r.ok]
+
+    def pace(self, filmed: bool = False) -> list[float]:
+        """Simulated over real time of every completed repeat."""
+        runs = self.filmed if filmed else self.bare
+        return [r.record["cost"]["simulated_to_real"] for r in runs if r.ok]
+
+
+def table2(
+    methods: Sequence[str], pools: Sequence[int | None], repeats: int, quick: bool, store: Store, hooks: Hooks,
+    device: str, wall_limit: float,
+) -> list[Row]:  # fmt: skip
+    """All rows, one run at a time so that times mean something; without pictures first."""
+    rows = []
+    for method in methods:
+        for pool in pools:
+            for variant, name in VARIANTS.items():
+                scenario = load(name, {} if pool is None else {"pool": pool}, quick)
+                table = scenario.model_dump(mode="json")
+                groups = []
+                for every in (None, PICTURE):
+                    jobs = [Job(table, method, device, repeat=r, wall_limit=wall_limit, film_every=every)
+                            for r in range(repeats)]  # fmt: skip
+                    groups.append(execute(jobs, store, hooks))
+                rows.append(Row(variant, pool, method, *groups))
+    return rows
+
+
+def claims(rows: Sequence[Row]) -> list[tuple[str, str, str, str]]:
+    """(method, claim, measured, verdict) of what the paper says of its own table; a verdict needs two repeats."""
+    found = []
+    for method in dict.fromkeys(row.method for row in rows):
+        own = [row for row in rows if row.method == method]
+        speed = {(r.variant, r.pool): r.speed() for r in own}
+        pools = list(dict.fromkeys(r.pool for r in own))
+        last = pools[-1]
+        found.append((method, "cost insensitive to the pool's size", *_insensitive(speed, pools)))
+        if enough := [v for v in VARIANTS if len(speed.get((v, last), [])) > 1]:
+            s = {v: mean(speed[v, last]) for v in enough}
+            if {"plain", "curing", "expansion"} <= set(s):
+                cure, grow = s["plain"] / s["curing"], s["plain"] / s["expansion"]
+                ok = cure < 2.0 and grow > EFFECT * cure
+                text = f"steps/s fall {cure:.2f}-fold with curing, {grow:.2f}-fold with expansion"
+                found.append((method, "curing a modest overhead, expansion a stronger one", text, _word(ok)))
+            if len(s) == len(VARIANTS):
+                slowest = min(s, key=lambda v: s[v])
+                text = ", ".join(f"{v} {x:.0f}" for v, x in s.items())
+                found.append((method, "both with the drone the most", f"steps/s: {text}",
+                              _word(slowest == "expansion + curing + drone")))  # fmt: skip
+        heavy = [r for r in own if r.variant == "expansion + curing + drone" and len(r.speed(True)) > 1]
+        if heavy and len(heavy[-1].speed()) > 1:
+            share = mean(heavy[-1].speed(True)) / mean(heavy[-1].speed())
+            text = f"with pictures {share:.0%} of the steps/s without"
+            found.append((method, "rendering the bottleneck", text, _word(share < BOTTLENECK)))
+    return found
+
+
+def _insensitive(speed: dict, pools: Sequence[int | None]) -> tuple[str, str]:
+    small, large = (speed.get(("plain", pool), []) for pool in (pools[0], pools[-1]))
+    if len(pools) < 2 or min(len(small), len(large)) < 2:
+        return "one pool, or one repeat", OPEN
+    factor = mean(small) / mean(large)
+    return f"{factor:.2f}-fold from the small to the large pool", _word(1 / SAME < factor < SAME)
+
+
+def _word(holds: bool) -> str:
+    return CONFIRMED if holds else REFUTED
+
+
+def spread(values: Sequence[float]) -> str:
+    """Mean and standard deviation."""
+    if not values:
+        return "-"
+    return f"{mean(values):.4g}" + (f" ± {stdev(values):.2g}" if len(values) > 1 else "")
