@@ -4,10 +4,10 @@ import sys
 
 from ..errors import UserError
 
-from . import runs, studies, info  # isort: skip  (the order of the verbs in --help)
+from . import runs, studies, pictures, info  # isort: skip  (the order of the verbs in --help)
 from .app import app
 
-__all__ = ["app", "info", "main", "runs", "studies"]
+__all__ = ["app", "info", "main", "pictures", "runs", "studies"]
 
 
 def main() -> None:

@@ -21,6 +21,8 @@ Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], inste
 Device = Annotated[str, typer.Option(help="cpu, or cuda:0, cuda:1, ...")]
 Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/SCENARIO")]
 WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
+Film = Annotated[float | None, typer.Option("--render-every", min=1e-6, help="simulated seconds between pictures, "
+                                            "drawn beside the run into its folder film/")]  # fmt: skip
 Frames = Annotated[bool, typer.Option("--frames", help="keep a snapshot of every output, not only of the last")]
 
 

@@ -8,6 +8,7 @@ import typer
 
 from .app import (
     Device,
+    Film,
     Frames,
     Out,
     ScenarioName,
@@ -38,12 +39,13 @@ def compare(
     wall_limit: WallLimit = 900.0,
     frames: Frames = False,
     quick: Quick = False,
+    render_every: Film = None,
 ) -> None:
     """Run one scenario through several methods and put fidelity and cost side by side.
 
     A second call with the same inputs reuses the runs that are finished.
     """
-    _study(scenario, solvers, set_, spacing, repeats, device, out, wall_limit, frames, quick)
+    _study(scenario, solvers, set_, spacing, repeats, device, out, wall_limit, frames, quick, render_every)
 
 
 @app.command()
@@ -57,9 +59,10 @@ def run(
     wall_limit: WallLimit = 900.0,
     frames: Frames = False,
     quick: Quick = False,
+    render_every: Film = None,
 ) -> None:
     """Run one scenario through one method."""
-    _study(scenario, solver, set_, spacing, 1, device, out, wall_limit, frames, quick)
+    _study(scenario, solver, set_, spacing, 1, device, out, wall_limit, frames, quick, render_every)
 
 
 @app.command()
@@ -127,6 +130,7 @@ def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None
 def _study(
     name: str, solvers: str, settings: list[str] | None, spacing: float | None, repeats: int, device: str,
     out: Path | None, wall_limit: float, frames: bool, quick: bool,
+    film_every: float | None,
 ) -> None:  # fmt: skip
     """compare and run: everything is checked before anything is written."""
     from rich.console import Console
@@ -137,7 +141,7 @@ def _study(
 
     scenario = load_scenario(name, settings, spacing, quick)
     methods = split(solvers) or solver_names()
-    planned = jobs(scenario, methods, repeats, device, "warp", wall_limit, frames)
+    planned = jobs(scenario, methods, repeats, device, "warp", wall_limit, frames, film_every)
     check_device(device)
     console, errors = Console(), Console(stderr=True)
     for warning in scenario.warnings():

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 def jobs(
     scenario: Scenario, methods: Sequence[str], repeats: int, device: str, backend: str, wall_limit: float | None,
-    keep_frames: bool,
+    keep_frames: bool, film_every: float | None = None,
 ) -> list[Job]:  # fmt: skip
     """All runs of a comparison; raises UserError for an unknown method or setting before anything has run."""
     for name in methods:
         configure(get_solver(name), scenario)
     table = scenario.model_dump(mode="json")
     return [
-        Job(table, name, device, backend, repeat, wall_limit, keep_frames)
+        Job(table, name, device, backend, repeat, wall_limit, keep_frames, film_every)
         for name in methods
         for repeat in range(repeats)
     ]

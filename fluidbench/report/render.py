@@ -1,0 +1,167 @@
+"""Pictures of a finished run in three dimensions, by PyVista (the extra `viz`): a still, a turntable, a film over its
+snapshots, and a time series for ParaView."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import UserError, suggestion
+from ..particles import CARRIED
+from ..scenario import Scenario
+from ..store import RECORD, write_atomically
+
+COLOURS = ("layer", "phase", "speed", "density", "height")
+WINDOW, TURNS, FPS = (1280, 960), 90, 20
+LAYERS = ("#3473b7", "#f29e40")  # alternating, as in the paper's pictures
+
+
+def load(folder: Path) -> tuple[Scenario, list[dict[str, np.ndarray]]]:
+    """Scenario and snapshots of a run's folder: those kept on the way (`--frames`), or the last one alone.
+
+    Raises UserError where there is no finished run.
+    """
+    record_path = folder / RECORD
+    if not record_path.is_file():
+        raise UserError(f"{folder}: no run here (no {RECORD}); give a folder such as fluidbench-out/NAME/runs/...")
+    record = json.loads(record_path.read_text())
+    if "input" not in record or not (folder / "final.npz").is_file():
+        raise UserError(f"{folder}: the run has no particles to show ({record['verdict']}: {record.get('reason', '')})")
+    paths = sorted(folder.glob("frame_*.npz")) or [folder / "final.npz"]
+    frames = []
+    for path in paths:
+        with np.load(path) as data:
+            frame = {key: data[key] for key in data.files}
+        free = frame["held"] != CARRIED
+        frames.append({key: value if value.ndim == 0 else value[free] for key, value in frame.items()})
+    return Scenario.model_validate(record["input"]), frames
+
+
+def values_of(frame: dict[str, np.ndarray], scenario: Scenario, colour: str) -> np.ndarray:
+    """What a particle is coloured by, shape (n,)."""
+    if colour not in COLOURS:
+        raise UserError(f"no colour '{colour}'{suggestion(colour, COLOURS)}; there are {', '.join(COLOURS)}")
+    if colour == "speed":
+        return np.linalg.norm(frame["velocity"], axis=1)
+    if colour == "height":
+        return frame["position"][:, 2]
+    if colour == "layer":
+        track = scenario.track
+        births = frame["birth_time"].astype(float)
+        return np.zeros(len(births)) if track is None else track.layer_at(births - 1e-9) % 2.0
+    return frame[colour].astype(float)
+
+
+def _pyvista() -> Any:
+    try:
+        import pyvista
+    except ImportError:
+        raise UserError("rendering needs PyVista: pip install 'fluidbench[viz]'") from None
+    return pyvista
+
+
+def _cloud(pv: Any, frame: dict[str, np.ndarray], scenario: Scenario, colour: str) -> Any:
+    """Particles as spheres of their volume."""
+    points = pv.PolyData(frame["position"].astype(np.float32))
+    points["value"] = values_of(frame, scenario, colour)
+    points["diameter"] = 1.1 * np.cbrt(frame["volume"])
+    ball = pv.Sphere(radius=0.5, theta_resolution=8, phi_resolution=8)
+    return points.glyph(geom=ball, scale="diameter", orient=False)
+
+
+class Stage:
+    """A plotter with floor, light and camera set for a scenario; off screen."""
+
+    def __init__(self, scenario: Scenario, frames: Iterable[dict[str, np.ndarray]], colour: str) -> None:
+        self.pv, self.scenario, self.colour = _pyvista(), scenario, colour
+        self.plotter = self.pv.Plotter(off_screen=True, window_size=WINDOW)
+        filled = [frame["position"] for frame in frames if len(frame["position"])]
+        if not filled:
+            raise UserError("the run holds no particles outside the nozzle yet")
+        low, high = np.min([p.min(axis=0) for p in filled], axis=0), np.max([p.max(axis=0) for p in filled], axis=0)
+        self.center, self.size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+        values = np.concatenate([values_of(frame, scenario, colour) for frame in frames if len(frame["position"])])
+        self.limits = (0.0, 1.0) if colour == "layer" else (float(values.min()), float(values.max()) + 1e-12)
+        floor = (self.center[0], self.center[1], scenario.domain.lower[2])
+        self.plotter.add_mesh(
+            self.pv.Plane(center=floor, i_size=2 * self.size, j_size=2 * self.size), color="#e8e8e8", ambient=0.4
+        )
+        self.plotter.set_background("white")
+        self.look(0.0)
+
+    def look(self, turn: float) -> None:
+        """Put the camera at an angle about the vertical [rad]."""
+        arm = 1.35 * self.size * np.array([np.cos(turn - 1.1), np.sin(turn - 1.1), 0.55])
+        self.plotter.camera_position = [tuple(self.center + arm), tuple(self.center), (0.0, 0.0, 1.0)]
+
+    def show(self, frame: dict[str, np.ndarray]) -> None:
+        """Replace what is on the stage."""
+        self.plotter.remove_actor("matter", render=False)
+        if not len(frame["position"]):
+            return
+        style: dict[str, Any] = {"cmap": list(LAYERS), "show_scalar_bar": False} if self.colour == "layer" else {
+            "cmap": "viridis", "scalar_bar_args": {"title": self.colour, "color": "black"}}  # fmt: skip
+        cloud = _cloud(self.pv, frame, self.scenario, self.colour)
+        self.plotter.add_mesh(cloud, scalars="value", clim=self.limits, name="matter", smooth_shading=True, **style)
+
+    def still(self, path: Path) -> Path:
+        self.plotter.screenshot(str(path))
+        return path
+
+
+def render(folder: Path, colour: str, turntable: bool, film: bool) -> list[Path]:
+    """Draw a run into its folder: render.png, and where asked turntable.mp4 and film.mp4; returns the files."""
+    scenario, frames = load(folder)
+    if film and len(frames) < 2:
+        raise UserError(f"{folder}: a film needs snapshots; run it with --frames")
+    stage = Stage(scenario, frames, colour)
+    stage.show(frames[-1])
+    made = [stage.still(folder / "render.png")]
+    if turntable:
+        steps = (lambda i=i: stage.look(2 * np.pi * i / TURNS) for i in range(TURNS))
+        made.append(_movie(stage, folder / "turntable.mp4", steps))
+        stage.look(0.0)
+    if film:
+        made.append(_movie(stage, folder / "film.mp4", (lambda f=frame: stage.show(f) for frame in frames)))
+    stage.plotter.close()
+    return made
+
+
+def _movie(stage: Stage, path: Path, steps: Iterable[Any]) -> Path:
+    """An MP4 with one picture after each step."""
+    try:
+        import imageio.v2 as imageio
+    except ImportError:
+        raise UserError("films need imageio: pip install 'fluidbench[viz]'") from None
+    part = path.with_suffix(".part.mp4")
+    with imageio.get_writer(part, fps=FPS, macro_block_size=16) as writer:
+        for step in steps:
+            step()
+            writer.append_data(stage.plotter.screenshot(None, return_img=True))
+    part.replace(path)
+    return path
+
+
+def export(folder: Path) -> Path:
+    """Every snapshot as .vtp with all particle fields, and series.pvd, which ParaView opens as a time series."""
+    pv = _pyvista()
+    scenario, frames = load(folder)
+    target = folder / "paraview"
+    target.mkdir(exist_ok=True)
+    lines = []
+    for i, frame in enumerate(frame for frame in frames if len(frame["position"])):
+        points = pv.PolyData(frame["position"].astype(np.float32))
+        for key, value in frame.items():
+            if value.ndim and key != "position":
+                points[key] = value
+        points["layer"] = values_of(frame, scenario, "layer")
+        points.save(target / f"particles_{i:04d}.vtp")
+        lines.append(f'<DataSet timestep="{float(frame["time"]):.9g}" file="particles_{i:04d}.vtp"/>')
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>'
+    tail = "</Collection></VTKFile>"
+    write_atomically(target / "series.pvd", "\n".join([head, *lines, tail, ""]))
+    return target / "series.pvd"
