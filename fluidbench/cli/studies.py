@@ -149,7 +149,8 @@ def ablate(
     with _watch("ablate", total) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
         done = study(resolved, methods, share, store, hooks, workers, device, wall_limit)
-    _publish(report(resolved, scenario, done, share, store.root), store.root)
+    given = [*(set_ or []), *([f"spacing={spacing!r}"] if spacing is not None else [])]
+    _publish(report(resolved, scenario, given, done, share, store.root), store.root)
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..scenario import Scenario
@@ -20,7 +21,9 @@ def verdict(seen: Effect, tolerance: float) -> str:
     return "droppable" if seen.saved > WORTH else "idle"
 
 
-def report(scenario: Scenario, name: str, done: Ablation, tolerance: float, root: Path) -> Report:
+def report(
+    scenario: Scenario, name: str, given: Sequence[str], done: Ablation, tolerance: float, root: Path
+) -> Report:  # fmt: skip
     import pandas as pd
 
     table = Table(
@@ -53,7 +56,7 @@ def report(scenario: Scenario, name: str, done: Ablation, tolerance: float, root
             lean = done.lean[method]
             findings.append(
                 f"{method}: leanest within {tolerance:.0%}: {lean.change.name}: saves {lean.saved:.0%} of the time, "
-                f"moves {lean.length} by {lean.moved:.1%}. Alone: {command(name, lean)}"
+                f"moves {lean.length} by {lean.moved:.1%}. Alone: {command(name, given, lean)}"
             )
     plot = Plot("ablate", "what each change moves and saves", "time saved [%]", "length moved [%]")
     for method in done.base:

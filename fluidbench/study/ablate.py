@@ -186,9 +186,10 @@ def _clash(candidate: Effect, chosen: Sequence[Effect]) -> bool:
     return any(set(candidate.change.settings) & set(e.change.settings) for e in chosen)
 
 
-def command(scenario: str, seen: Effect) -> str:
-    """The command that runs a lean mix alone."""
-    sets = " ".join(f"--set {key}={_toml(value)}" for key, value in seen.change.settings.items())
+def command(scenario: str, given: Sequence[str], seen: Effect) -> str:
+    """The command that runs a lean mix alone, on top of the settings given (key=value)."""
+    own = [text for text in given if text.split("=")[0].strip() not in seen.change.settings]
+    sets = " ".join(f"--set {text}" for text in [*own, *(f"{k}={_toml(v)}" for k, v in seen.change.settings.items())])
     return f"fluidbench run {scenario} --solver {seen.method} {sets}"
 
 

@@ -21,9 +21,6 @@ from .grid import FAULT_BLOCKS, cells_of, grid_of
 
 ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
 ISOLATED_VISCOUS = 0.25
-# Offspring lie in no order: the filling that the grid sees fluctuates by a tenth. Its correction, which only ever makes
-# matter denser, must leave that alone: it rectified the noise into 5 % of volume.
-DISORDER = 0.1
 
 
 class ConfigMPM(Config):
@@ -80,7 +77,7 @@ class SolverMPM(Solver):
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
         self.feedback = kernels.Feedback()
         self.feedback.rate = config.volume_feedback / min(self.grid.dx)
-        self.feedback.tolerance = max(config.volume_tolerance, DISORDER if scene.expands else 0.0)
+        self.feedback.tolerance = max(config.volume_tolerance, aging.DISORDER if scene.expands else 0.0)
         blocks = self.grid.blocks_per_world * scene.worlds
         slots = min(blocks, 512 + int(config.blocks_per_particle * pool.size))
         pool.add_field("affine", wp.mat33)

@@ -14,7 +14,7 @@ from fluidbench.particles import CARRIED
 from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid
 
 from .. import constitutive
-from ..aging import carried_compression, relieved_tensor, rest_density
+from ..aging import DISORDER, carried_compression, relieved_tensor, rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import (
@@ -140,7 +140,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
             whole = wp.max(1.0 - wp.length(lean) * num.h / (WHOLE * rho), 0.0)
             if drift > 0.0:
                 whole = 1.0
-            drift = wp.sign(drift) * wp.max(wp.abs(drift) - num.density_tolerance * rho, 0.0)
+            tolerance = float(num.density_tolerance)
+            if rest < 0.99 * phase.density:
+                tolerance = wp.max(tolerance, DISORDER)
+            drift = wp.sign(drift) * wp.max(wp.abs(drift) - tolerance * rho, 0.0)
             if phase.relaxation_rate > 0.0 or rest < 0.99 * phase.density:
                 # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and
                 # would be pulled closer
