@@ -4,6 +4,9 @@ One substep: clear_grid, p2g (strain, stress, scatter), grid (momentum balance a
 Quadratic B-splines; D = diag(dx^2) / 4, so the inverse inertia tensor is 4 diag(1 / dx^2).
 """
 
+import functools
+from types import SimpleNamespace
+
 import warp as wp
 
 from fluidbench.particles import CARRIED, CLAMPED, FREE
@@ -11,7 +14,7 @@ from fluidbench.scene import Force, Phase, force_at, is_solid
 
 from .. import constitutive
 from ..aging import carried_compression, relieved_tensor
-from ..bind import warp_func
+from ..bind import rebound, warp_func
 from ..smoothing import quadratic_spline
 from ..vector_access import add_vec4, in_company, load_vec4, run_of
 from .grid import FIRST, Grid, activate_stencil, first_node, node_of, wrapped
@@ -22,6 +25,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 pressure = warp_func(constitutive.pressure)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 spline = warp_func(quadratic_spline)
+EXPANDS = False  # whether rest densities may differ, see `passes`
 FAULT_STENCIL = 2
 # Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
 # they share: a beam falls slowly off it.
@@ -119,12 +123,11 @@ def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocit
     return tau
 
 
-@wp.kernel
 def p2g(
     grid: Grid, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), phases: wp.array2d(dtype=Phase),
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), affine: wp.array(dtype=wp.mat33),
     mass: wp.array(dtype=float), volume: wp.array(dtype=float), phase_of: wp.array(dtype=int),
-    held: wp.array(dtype=int), table: wp.array(dtype=int), expands: int,
+    held: wp.array(dtype=int), table: wp.array(dtype=int),
     # outputs
     volume_ratio: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
     elastic_shear: wp.array(dtype=wp.vec3), raw: wp.array(dtype=wp.vec4), fill: wp.array(dtype=wp.vec4),
@@ -132,7 +135,7 @@ def p2g(
 ):  # fmt: skip
     """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18).
 
-    Where rest densities differ (`expands`) mass does not tell how full a node is: `fill` collects fresh density times
+    Where rest densities differ (EXPANDS) mass does not tell how full a node is: `fill` collects fresh density times
     rest volume instead.
     """
     p = wp.tid()
@@ -201,14 +204,13 @@ def p2g(
                 w = wxy * wz[r]
                 node = wp.where(on, slot * 64 + lx[o] + ly[q] + lz[r], -1)
                 add_vec4(raw, node, wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m), run)
-                if expands == 1:
+                if wp.static(EXPANDS):
                     add_vec4(fill, node, wp.vec4(0.0, 0.0, 0.0, w * volume[p] * phase.density), run)
 
 
-@wp.kernel
 def grid_step(
     grid: Grid, lanes: int, active: wp.array(dtype=int), block_of: wp.array(dtype=int), table: wp.array(dtype=int),
-    raw: wp.array(dtype=wp.vec4), fill: wp.array(dtype=wp.vec4), expands: int, dt: wp.array(dtype=float),
+    raw: wp.array(dtype=wp.vec4), fill: wp.array(dtype=wp.vec4), dt: wp.array(dtype=float),
     force: wp.array(dtype=Force), phases: wp.array2d(dtype=Phase),
     # outputs
     moving: wp.array(dtype=wp.vec4),
@@ -248,7 +250,7 @@ def grid_step(
             if wall:
                 v = wall_velocity(grid, inside, touching, v)
             density = total[3] * grid.inv_volume
-            if expands == 1:
+            if wp.static(EXPANDS):
                 if wall:
                     density = folded(grid, world, inside, touching, table, fill)[3] * grid.inv_volume
                 else:
@@ -382,3 +384,16 @@ def harden(
         carried = 1.0 / (1.0 + carried_compression(before, after, 1.0 / j - 1.0))
         volume_ratio[p] = carried
         volume[p] = volume[p] * (j / carried)
+
+
+@functools.cache
+def passes(expands: bool) -> SimpleNamespace:
+    """The passes that differ where matter expands, each compiled for one case: unused physics costs nothing."""
+    options = {"fast_math": True, "enable_backward": False}
+    return SimpleNamespace(**{
+        law.__name__: wp.kernel(
+            rebound(law, {"EXPANDS": expands}), name=f"{law.__name__}_{'expanding' if expands else 'plain'}",
+            module="unique", module_options=options,
+        )
+        for law in (p2g, grid_step)
+    })  # fmt: skip

@@ -74,6 +74,7 @@ class SolverMPM(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
         self.scene, self.pool, self.config = scene, pool, config
+        self.kernels = kernels.passes(scene.expands)
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
         self.feedback = kernels.Feedback()
         self.feedback.rate = config.volume_feedback / min(self.grid.dx)
@@ -163,10 +164,10 @@ class SolverMPM(Solver):
     def p2g(self) -> None:
         pool, scene = self.pool, self.scene
         wp.launch(
-            kernels.p2g,
+            self.kernels.p2g,
             pool.size,
             [self.grid, pool.capacity, pool.count, scene.dt, scene.phases, pool.position, pool.velocity, pool.affine,
-             pool.mass, pool.volume, pool.phase, pool.held, self.table, int(scene.expands)],
+             pool.mass, pool.volume, pool.phase, pool.held, self.table],
             [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, self.fill, pool.fault],
             device=scene.device,
             block_dim=128,
@@ -174,10 +175,10 @@ class SolverMPM(Solver):
 
     def grid_step(self) -> None:
         wp.launch(
-            kernels.grid_step,
+            self.kernels.grid_step,
             self.node_lanes,
-            [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.fill,
-             int(self.scene.expands), self.scene.dt, self.scene.force, self.scene.phases],
+            [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.fill, self.scene.dt,
+             self.scene.force, self.scene.phases],
             [self.moving],
             device=self.scene.device,
         )  # fmt: skip
@@ -212,7 +213,9 @@ class SolverMPM(Solver):
         )
 
     def prepare(self) -> None:
-        for module in (kernels, aging) if self.scene.grows else (kernels,):
+        names = [kernels, *([aging] if self.scene.grows else [])]
+        names += [kernel.module.name for kernel in vars(self.kernels).values()]
+        for module in names:
             wp.load_module(module, device=self.scene.device)
 
     def sort_keys(self) -> Any:
