@@ -57,5 +57,6 @@ CASE = Case(
     "exact: lengths as R^(1/3); validation G",
     "largest relative error of volume and of roundness; infinite if mass moved",
     spacing=RADIUS / 4, tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
+    causes={"sph": "its summed density reads split halves as too dense: 2 % too large at tenfold, 5 % at thirtyfold"},
     exempt={"pbd": "density constraints only push: the foam keeps the speed of its fastest growth and flies apart"},
 )  # fmt: skip

@@ -34,7 +34,7 @@ def test_each_criterion_of_success_is_listed_alone(tower):
 def test_pictures_are_taken_beside_the_run(tower):
     _, folder = tower
     pictures = sorted((folder / "film").glob("*.png"))
-    assert len(pictures) == 3 and not list((folder / "film").glob("*.npz"))
+    assert len(pictures) == 4 and not list((folder / "film").glob("*.npz"))
 
 
 def test_a_run_is_rendered_filmed_and_exported(tower):
