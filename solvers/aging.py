@@ -78,3 +78,68 @@ def swell_at_volume(
         factor = wp.exp(growth[i] * dt[world])
         volume[i] = volume[i] * factor
         volume_ratio[i] = volume_ratio[i] / factor
+
+
+@wp.func
+def relieve(
+    before: Phase, after: Phase, i: int, elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3)
+):
+    """Carry the shear stress of particle i over."""
+    b, s = relieved_tensor(before, after, elastic_normal[i], elastic_shear[i])
+    elastic_normal[i] = b
+    elastic_shear[i] = s
+
+
+@wp.kernel
+def harden(
+    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    # outputs
+    phase_of: wp.array(dtype=int), elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """Move particles to the phase they are due, for a method without a pressure law."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and due[i] != phase_of[i]:
+        if elastic == 1:
+            relieve(phases[world, phase_of[i]], phases[world, due[i]], i, elastic_normal, elastic_shear)
+        phase_of[i] = due[i]
+
+
+@wp.kernel
+def harden_at_ratio(
+    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    # outputs
+    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), volume_ratio: wp.array(dtype=float),
+    elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """The same for a method that integrates J: the present volume V0 J stays."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and due[i] != phase_of[i]:
+        before, after = phases[world, phase_of[i]], phases[world, due[i]]
+        phase_of[i] = due[i]
+        relieve(before, after, i, elastic_normal, elastic_shear)
+        j = volume_ratio[i]
+        carried = 1.0 / (1.0 + carried_compression(before, after, 1.0 / j - 1.0))
+        volume_ratio[i] = carried
+        volume[i] = volume[i] * (j / carried)
+
+
+@wp.kernel
+def harden_at_density(
+    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    mass: wp.array(dtype=float), density: wp.array(dtype=float),
+    # outputs
+    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """The same for a method that integrates density, which stays."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and due[i] != phase_of[i]:
+        before, after = phases[world, phase_of[i]], phases[world, due[i]]
+        phase_of[i] = due[i]
+        if elastic == 1:
+            relieve(before, after, i, elastic_normal, elastic_shear)
+        compression = density[i] / rest_density(mass, volume, i) - 1.0
+        volume[i] = mass[i] * (1.0 + carried_compression(before, after, compression)) / density[i]

@@ -13,7 +13,6 @@ from fluidbench.particles import CARRIED, CLAMPED, FREE
 from fluidbench.scene import Force, Phase, force_at, is_solid
 
 from .. import constitutive
-from ..aging import carried_compression, relieved_tensor
 from ..bind import rebound, warp_func
 from ..smoothing import quadratic_spline
 from ..vector_access import add_vec4, in_company, load_vec4, run_of
@@ -362,28 +361,6 @@ def g2p(
         after = first_node(grid, x)
         if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
             activate_stencil(grid, world, after, table, block_of, active, fault)
-
-
-@wp.kernel
-def harden(
-    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
-    # outputs
-    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), volume_ratio: wp.array(dtype=float),
-    elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-):  # fmt: skip
-    """Move particles to the phase they are due; their stress and their present volume carry over (see aging.py)."""
-    p = wp.tid()
-    world = p / capacity
-    if p - world * capacity < count[world] and due[p] != phase_of[p]:
-        before, after = phases[world, phase_of[p]], phases[world, due[p]]
-        phase_of[p] = due[p]
-        b, s = relieved_tensor(before, after, elastic_normal[p], elastic_shear[p])
-        elastic_normal[p] = b
-        elastic_shear[p] = s
-        j = volume_ratio[p]
-        carried = 1.0 / (1.0 + carried_compression(before, after, 1.0 / j - 1.0))
-        volume_ratio[p] = carried
-        volume[p] = volume[p] * (j / carried)
 
 
 @functools.cache

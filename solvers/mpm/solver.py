@@ -148,7 +148,7 @@ class SolverMPM(Solver):
     def harden(self, due: wp.array) -> None:
         pool = self.pool
         wp.launch(
-            kernels.harden,
+            aging.harden_at_ratio,
             pool.size,
             [pool.capacity, pool.count, self.scene.phases, due],
             [pool.phase, pool.volume, pool.volume_ratio, pool.elastic_normal, pool.elastic_shear],
@@ -213,7 +213,7 @@ class SolverMPM(Solver):
         )
 
     def prepare(self) -> None:
-        names = [kernels, *([aging] if self.scene.grows else [])]
+        names = [kernels, *([aging] if self.scene.changes else [])]
         names += [kernel.module.name for kernel in vars(self.kernels).values()]
         for module in names:
             wp.load_module(module, device=self.scene.device)

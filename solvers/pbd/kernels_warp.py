@@ -12,7 +12,7 @@ from fluidbench.particles import CARRIED
 from fluidbench.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
 
 from .. import constitutive
-from ..aging import relieved_tensor, rest_density
+from ..aging import rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, image_position, image_velocity
@@ -356,21 +356,3 @@ def rub(
                 v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
                 v[axis] = normal
         velocity[i] = v
-
-
-@wp.kernel
-def harden(
-    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
-    # outputs
-    phase_of: wp.array(dtype=int), elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-):  # fmt: skip
-    """Move particles to the phase they are due; the elastic stress of what still flows carries over."""
-    i = wp.tid()
-    world = i / capacity
-    if i - world * capacity < count[world] and due[i] != phase_of[i]:
-        if elastic == 1:
-            before, after = phases[world, phase_of[i]], phases[world, due[i]]
-            b, s = relieved_tensor(before, after, elastic_normal[i], elastic_shear[i])
-            elastic_normal[i] = b
-            elastic_shear[i] = s
-        phase_of[i] = due[i]

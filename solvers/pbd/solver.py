@@ -185,7 +185,7 @@ class SolverPBD(Solver):
         tensor = [pool.elastic_normal, pool.elastic_shear] if flowing else [self.motion, self.motion]
         if self.network is not None:
             self.network.relieve(due)
-        self._launch(kernels.harden, [int(flowing), *self._active(), self.scene.phases, due], [pool.phase, *tensor])
+        self._launch(aging.harden, [int(flowing), *self._active(), self.scene.phases, due], [pool.phase, *tensor])
 
     def predict(self) -> None:
         pool, scene = self.pool, self.scene

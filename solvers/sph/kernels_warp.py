@@ -14,7 +14,7 @@ from fluidbench.particles import CARRIED
 from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid
 
 from .. import constitutive
-from ..aging import DISORDER, carried_compression, relieved_tensor, rest_density
+from ..aging import DISORDER, rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import (
@@ -347,26 +347,3 @@ def move(
         position[i] = x
         velocity[i] = v
         density[i] = new_density[i]
-
-
-@wp.kernel
-def harden(
-    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
-    mass: wp.array(dtype=float), density: wp.array(dtype=float),
-    # outputs
-    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
-    elastic_shear: wp.array(dtype=wp.vec3),
-):  # fmt: skip
-    """Move particles to the phase they are due; their stress and their present density carry over (see aging.py)."""
-    i = wp.tid()
-    world = i / capacity
-    if i - world * capacity < count[world] and due[i] != phase_of[i]:
-        before, after = phases[world, phase_of[i]], phases[world, due[i]]
-        phase_of[i] = due[i]
-        if elastic == 1:
-            b, s = relieved_tensor(before, after, elastic_normal[i], elastic_shear[i])
-            elastic_normal[i] = b
-            elastic_shear[i] = s
-        compression = density[i] / rest_density(mass, volume, i) - 1.0
-        rest = density[i] / (1.0 + carried_compression(before, after, compression))
-        volume[i] = mass[i] / rest

@@ -161,7 +161,7 @@ class SolverSPH(Solver):
         pool, elastic = self.pool, self.scene.elastic
         tensor = [pool.elastic_normal, pool.elastic_shear] if elastic else [self.unused, self.unused]
         wp.launch(
-            kernels.harden,
+            aging.harden_at_density,
             pool.size,
             [int(elastic), pool.capacity, pool.count, self.scene.phases, due, pool.mass, pool.density],
             [pool.phase, pool.volume, *tensor],
