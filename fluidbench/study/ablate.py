@@ -71,6 +71,9 @@ def features(scenario: Scenario) -> list[Change]:
         found.append(Change("no plastic viscosity", {"material.plastic_viscosity": 0.0}))
     if m.viscosity > 0:
         found.append(Change("no viscosity", {"material.viscosity": 0.0}))
+    processes = {"curing": "material.cure", "expansion": "material.expansion", "collider": "collider"}
+    present = {"curing": m.cure, "expansion": m.expansion, "collider": scenario.collider}
+    found += [Change(f"no {name}", {key: None}) for name, key in processes.items() if present[name] is not None]
     rough = {
         f"domain.walls.{face}": "slip" for face, wall in scenario.domain.walls if isinstance(wall, Friction)
     }  # fmt: skip

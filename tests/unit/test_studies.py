@@ -156,6 +156,12 @@ def test_shares_and_winners_leave_out_what_missed():
 def test_changes_are_what_the_scenario_has():
     names = [c.name for c in changes(load("line_bead"), ["mpm", "pbd"])]
     assert "no yield stress" in names and "slip floor" in names and "fewer iterations" in names
+    tower = load("ring_tower_drone")
+    table = tower.model_dump(mode="json")
+    for change in changes(tower, ["mpm"]):
+        if change.name in ("no curing", "no expansion", "no collider"):
+            assert varied(table, change.settings) != tower
+    assert {"no curing", "no expansion", "no collider"} <= {c.name for c in changes(tower, ["mpm"])}
     assert not any("viscosity" in n for n in [c.name for c in changes(load("dam_break"), ["mpm"])])
 
 
