@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .timestep import Bound
 
 LOST = 0.1  # share of a scenario's own speed that single precision may lose
+STILL = 1e-3  # reference speed of a scenario that implies no motion [m/s]: nothing can be lost
 ENTRY_POINTS = "fluidbench.solvers"
 
 
@@ -161,7 +162,7 @@ def refusal(solver: type[Solver], scenario: Scenario, config: Any) -> str | None
     if missing:
         return f"it has no {' and no '.join(missing)}"
     lost, binding = _lost(solver, scenario, config)
-    if lost > LOST * scenario.reference_speed:
+    if scenario.reference_speed > STILL and lost > LOST * scenario.reference_speed:
         return (
             f"its step of {binding.dt:.2g} s (bound '{binding.name}') is too small for single precision: motion slower "
             f"than {lost:.2g} m/s would stand still; soften what binds it, or use a larger spacing"

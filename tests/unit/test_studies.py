@@ -142,6 +142,8 @@ def test_a_step_too_small_for_single_precision_is_refused():
     solver, scenario = get_solver("mpm"), load("line_bead", ["material.viscosity=1e6"])
     reason = refusal(solver, scenario, configure(solver, scenario))
     assert reason is not None and "single precision" in reason and "viscous" in reason
+    still = block({"density": 1000.0, "sound_speed": 0.05, "viscosity": 1e5}, 0.01)  # an experiment on stability
+    assert refusal(solver, still, configure(solver, still)) is None
     sane = load("line_bead")
     assert refusal(solver, sane, configure(solver, sane)) is None
     assert not approximations(solver, sane, configure(solver, sane))
