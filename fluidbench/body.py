@@ -1,4 +1,4 @@
-"""Material that is there when a scenario starts: shapes and initial velocities, validated, in SI units."""
+"""Material that does not come from a nozzle: shapes and initial velocities, validated, in SI units."""
 
 import math
 from typing import Literal
@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from .material import Positive
+from .material import NonNegative, Positive
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -29,7 +29,7 @@ class Wave(Model):
 
 
 class Body(Model):
-    """Material that is there at the start. Its velocity is the sum of `velocity`, of the gradient and the rotation
+    """Material that is there from `start` on. Its velocity is the sum of `velocity`, of the gradient and the rotation
     about the centre, and of `wave`.
 
     What lies outside the domain is cut off: a quarter of a cylinder stands at a corner of two slip walls.
@@ -44,6 +44,7 @@ class Body(Model):
     velocity_gradient: Matrix | None = Field(None, description="dv_i/dx_j about the centre [1/s]")
     angular_velocity: Vector = Field((0.0, 0.0, 0.0), description="rotation about the centre [rad/s]")
     wave: Wave | None = Field(None, description="a sine wave of velocity: amplitude, number, phase")
+    start: NonNegative = Field(0.0, description="when it appears: later for a layer laid on what is there [s]")
     clamped: bool = Field(False, description="keeps its velocity whatever happens: a clamp or a moving grip")
 
     @model_validator(mode="after")

@@ -84,8 +84,11 @@ class Pool:
         self.count.assign(np.array(self.counts, np.int32))
         self.stale = True
 
-    def place(self, position: np.ndarray, velocity: np.ndarray, volume: float, held: int = FREE) -> None:
-        """Add the same particles of equal rest volume to every world (positions (n, 3) [m], velocities [m/s])."""
+    def place(
+        self, position: np.ndarray, velocity: np.ndarray, volume: float, held: int, origin: np.ndarray, birth: float
+    ) -> None:
+        """Add the same particles of equal rest volume to every world: positions (n, 3) [m], velocities [m/s], numbers
+        in the order of creation (n,), and the time of their birth [s]."""
         n = len(position)
         for world, scenario in enumerate(self.scene.scenarios):
             self.need(world, n)
@@ -96,7 +99,8 @@ class Pool:
                 "volume": np.full(n, volume, np.float32),
                 "mass": np.full(n, volume * scenario.material.density, np.float32),
                 "held": np.full(n, held, np.int32),
-                "origin": np.arange(self.counts[world], self.counts[world] + n, dtype=np.int32),
+                "birth_time": np.full(n, birth, np.float32),
+                "origin": np.asarray(origin, np.int32),
             }
             for name, values in columns.items():
                 array = self.fields[name]

@@ -13,13 +13,14 @@ from . import health
 from .device import CountedLaunches
 from .errors import UserError
 from .health import Health, Vital
-from .layout import capacity_of, emitted, generations, sample
-from .particles import CLAMPED, FREE, OutOfCapacity, Pool
+from .layout import capacity_of, emitted, generations
+from .particles import OutOfCapacity, Pool
 from .process import contact, curing, emission, expansion
 from .process.contact import Contact
 from .process.curing import Curing
 from .process.emission import Emission
 from .process.expansion import Growing
+from .process.laying import Laying
 from .scenario import Scenario
 from .scene import Scene
 from .solver import Demands, Solver, configure, get_solver, refusal
@@ -75,9 +76,7 @@ class Simulation:
             if reason := refusal(solver_class, scenario, self.config):
                 raise UserError(f"{solver_class.name} cannot run {scenario.name}: {reason}")
         self.pool = Pool(self.scene, capacity_of(self.scenario))
-        for body in self.scenario.bodies:
-            points, volume = sample(body, self.scenario)
-            self.pool.place(points, body.velocity_at(points), volume, CLAMPED if body.clamped else FREE)
+        self.laying = Laying(self.scenario, self.pool)
         self.emission = Emission(self.scene, self.pool) if self.scenario.nozzle is not None else None
         material = self.scenario.material
         growing = material.expansion is not None
@@ -132,6 +131,7 @@ class Simulation:
 
     def _age(self) -> None:
         """What happens to material whatever the method, at the start of a tick."""
+        self.laying.advance(self.now)
         if self.emission is not None:
             self.emission.advance(self.now, self.tick)
         if self.growing is not None:

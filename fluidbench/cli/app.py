@@ -63,6 +63,13 @@ def fraction(text: str) -> float:
     return value
 
 
+def count_of(text: str, option: str) -> int:
+    """'298000' -> 298000; raises UserError for what is no positive whole number."""
+    if not text.isdecimal() or int(text) == 0:
+        raise UserError(f"{option} takes whole numbers such as 298000, or fit; got '{text}'")
+    return int(text)
+
+
 def budget_of(text: str) -> tuple[float, float]:
     """'60s' -> (60, inf), 'realtime' -> (inf, 1), '' -> (inf, inf): wall time [s] and wall s per simulated s."""
     word = text.strip().lower()

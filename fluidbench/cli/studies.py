@@ -16,6 +16,7 @@ from .app import (
     app,
     budget_of,
     check_device,
+    count_of,
     fraction,
     load_scenario,
     split,
@@ -244,7 +245,7 @@ def table2(
     from ..study.table2 import table2 as study
 
     methods, store, _ = _prepare(solvers, device, out, "table2", 1)
-    sizes = [None if part == "fit" else int(part) for part in split(pools)]
+    sizes = [None if part == "fit" else count_of(part, "--pools") for part in split(pools)]
     with _watch("table2", 2 * repeats * len(VARIANTS) * len(methods) * len(sizes)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
         rows = study(methods, sizes, repeats, quick, store, hooks, device, wall_limit)

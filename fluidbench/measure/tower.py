@@ -105,7 +105,7 @@ def _continuity(along: np.ndarray, mass: np.ndarray) -> float:
 
 
 def progress(frame: Frame, scenario: Scenario) -> dict[str, float]:
-    """What changes over time: share of mass that is cured to 95 %, volume over fresh volume, spread of families [m]."""
+    """What changes over time: share of mass that is cured to 95 %, and volume over fresh volume."""
     free = frame["held"] != CARRIED
     row: dict[str, float] = {}
     m = scenario.material

@@ -192,8 +192,7 @@ class Growing:
     """Expands a pool by its scenario's schedule, once a tick.
 
     `ancestors` is how many particles the scenario has without offspring, `generations` how often one of them may give
-    birth. Raises OutOfCapacity when children find no
-    room.
+    birth. Raises OutOfCapacity when children find no room.
     """
 
     def __init__(self, scene: Scene, pool: Pool, ancestors: int, generations: int) -> None:

@@ -25,8 +25,8 @@ class Film:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / ENDED).unlink(missing_ok=True)
         (folder / "scenario.json").write_text(json.dumps(scenario))
-        log = (folder / "log.txt").open("w")
-        self.drawer = subprocess.Popen([sys.executable, "-m", __name__, str(folder)], stdout=log, stderr=log)
+        with (folder / "log.txt").open("w") as log:
+            self.drawer = subprocess.Popen([sys.executable, "-m", __name__, str(folder)], stdout=log, stderr=log)
 
     def due(self, time: float) -> bool:
         return time >= self.next - 1e-9
@@ -84,8 +84,8 @@ class _Canvas:
     def draw(self, frame: dict[str, np.ndarray], path: Path) -> None:
         from matplotlib.image import imsave
 
-        x = frame["position"][np.argsort(-frame["position"][:, 1])]
-        births = frame["birth_time"][np.argsort(-frame["position"][:, 1])]
+        order = np.argsort(-frame["position"][:, 1])
+        x, births = frame["position"][order], frame["birth_time"][order]
         track = self.scenario.track
         layer = track.layer_at(births - 1e-9) if track is not None else np.zeros(len(x), int)
         light = 0.55 + 0.45 * (1.0 - (x[:, 1] - self.low[1]) / self.depth)

@@ -171,3 +171,25 @@ def test_a_collider_inside_the_material_or_the_jet_is_refused():
         table["collider"]["parts"] = [{"kind": "sphere", "center": center, "radius": 0.03}]
         with pytest.raises(UserError, match=words):
             validate(table, "hammer")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_layer_is_laid_at_its_time_and_stays_where_it_was_put(method):
+    layers = [{"kind": "box", "center": [0.02, 0.02, z], "size": [0.04, 0.04, 0.02], "start": start}
+              for z, start in ((0.03, 0.1), (0.01, 0.0))]  # fmt: skip
+    scenario = foam({}, bodies=layers, domain={"lower": [0, 0, 0], "upper": [0.04, 0.04, 0.08]})
+    sim = Simulation(scenario, method)
+    count = []
+    sim.run(lambda s, _: count.append((round(s.now, 6), sum(s.pool.counts))))
+    assert {n for t, n in count if t < 0.1 - 1e-6} == {32} and {n for t, n in count if t > 0.1 + 1e-6} == {64}
+    frame = sim.frame()
+    assert list(frame["origin"]) == list(range(64))
+    assert set(frame["birth_time"][:32]) == {0.0} and frame["birth_time"][32:] == pytest.approx(0.1)
+    assert frame["mass"].astype(float).sum() == pytest.approx(100.0 * 0.04**3, rel=1e-6)
+    assert np.ptp(frame["position"][32:, 2]) < 0.012 and frame["position"][32:, 2].min() > 0.022
+
+
+def test_a_layer_that_would_come_after_the_end_is_refused():
+    late = [{"kind": "box", "center": [0, 0, 0], "size": [0.04] * 3, "start": 0.3}]
+    with pytest.raises(UserError, match=r"bodies\.0: start = 0\.3 s is not before the end"):
+        foam({}, bodies=late)

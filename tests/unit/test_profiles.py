@@ -35,6 +35,14 @@ def test_semi_axes_of_an_ellipsoid():
     assert semi_axes(frame) == pytest.approx([0.1, 0.2, 0.3], rel=0.01)
 
 
+@pytest.mark.parametrize("cells", [2, 4, 7])
+def test_a_box_of_cubes_has_its_exact_moment_however_finely_it_is_divided(cells):
+    middle = (np.arange(cells) + 0.5) / cells
+    points = np.stack(np.meshgrid(middle, middle, middle), axis=-1).reshape(-1, 3)
+    frame = {"position": points, "mass": np.ones(cells**3), "volume": np.full(cells**3, cells**-3.0)}
+    assert semi_axes(frame, cubes=True) == pytest.approx([np.sqrt(5.0 / 12.0)] * 3)
+
+
 def test_energy_and_amplitude():
     z = np.linspace(0, 1, 200, endpoint=False)
     velocity = np.zeros((200, 3))
