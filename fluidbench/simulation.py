@@ -160,10 +160,13 @@ class Simulation:
         return vital
 
     def frame(self, world: int = 0) -> dict[str, np.ndarray]:
-        """A world's particles as they are now: the pool's core fields, `density` [kg/m^3] and `spin` [kg m^2/s]."""
+        """A world's particles as they are now: the pool's core fields, `density` [kg/m^3], `spin` [kg m^2/s] and, where
+        the method has it, `stress` [Pa]."""
         spins = self.solver.spins()
         spins = np.zeros((self.pool.size, 3), np.float32) if spins is None else spins
-        return self.pool.snapshot(world, density=self.solver.densities(), spin=spins)
+        stresses = self.solver.shear_stresses()
+        more = {} if stresses is None else {"stress": stresses}
+        return self.pool.snapshot(world, density=self.solver.densities(), spin=spins, **more)
 
     def reorder(self, keys: wp.array) -> None:
         """Sort the pool by a solver's keys."""

@@ -113,6 +113,11 @@ class Solver(ABC):
         where particles have none."""
         return None
 
+    def shear_stresses(self) -> Any | None:
+        """Elastic shear stress sqrt(J2) of every particle slot, shape (worlds * capacity,) [Pa]; None where there is
+        none, or where a method carries it otherwise than by particle."""
+        return None
+
     @abstractmethod
     def footprint(self) -> dict[str, int]:
         """Bytes allocated by the method itself, by part."""

@@ -5,10 +5,8 @@ relieved in proportion, and the rest volume is taken anew such that the present 
 Growth: rest volume grows while the present volume stays, so fresh foam is under pressure and pushes its neighbours.
 """
 
-import numpy as np
 import warp as wp
 
-from fluidbench.particles import Pool
 from fluidbench.scene import Phase
 
 from . import constitutive
@@ -45,11 +43,6 @@ def carried_compression(before: Phase, after: Phase, compression: float):
 def rest_density(mass: wp.array(dtype=float), volume: wp.array(dtype=float), i: int):
     """Of a particle that may have grown [kg/m^3]."""
     return mass[i] / volume[i]
-
-
-def present_density(pool: Pool, volume_ratio: np.ndarray) -> np.ndarray:
-    """m / (V0 J) of every slot, shape (worlds * capacity,) [kg/m^3]; 0 in slots that never held a particle."""
-    return pool.mass.numpy() / np.maximum(pool.volume.numpy() * volume_ratio, 1e-30)
 
 
 @wp.kernel

@@ -11,7 +11,7 @@ from .app import app
 @app.command()
 def render(
     run: Annotated[Path, typer.Argument(help="a run's folder (it holds record.json)")],
-    colour: Annotated[str, typer.Option(help="layer, phase, speed, density or height")] = "layer",
+    colour: Annotated[str, typer.Option(help="layer, phase, speed, stress, density or height")] = "layer",
     turntable: Annotated[bool, typer.Option(help="also turntable.mp4, once around it")] = True,
     film: Annotated[bool, typer.Option("--film", help="also film.mp4 over the snapshots kept by --frames")] = False,
     export: Annotated[bool, typer.Option("--export", help="also a time series for ParaView")] = False,

@@ -15,7 +15,7 @@ from ..particles import CARRIED
 from ..scenario import Scenario
 from ..store import RECORD, write_atomically
 
-COLOURS = ("layer", "phase", "speed", "density", "height")
+COLOURS = ("layer", "phase", "speed", "stress", "density", "height")
 WINDOW, TURNS, FPS = (1280, 960), 90, 20
 LAYERS = ("#3473b7", "#f29e40")  # alternating, as in the paper's pictures
 
@@ -53,6 +53,8 @@ def values_of(frame: dict[str, np.ndarray], scenario: Scenario, colour: str) -> 
         track = scenario.track
         births = frame["birth_time"].astype(float)
         return np.zeros(len(births)) if track is None else track.layer_at(births - 1e-9) % 2.0
+    if colour not in frame:
+        raise UserError(f"this run has no {colour} by particle: its material or its method has none")
     return frame[colour].astype(float)
 
 

@@ -14,8 +14,8 @@ from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound, damped_limit
 
 from .. import aging
-from ..aging import present_density
 from ..order import CellOrder
+from ..readout import present_density, shear_stress
 from . import kernels_warp as kernels
 from .grid import FAULT_BLOCKS, cells_of, grid_of
 
@@ -229,6 +229,9 @@ class SolverMPM(Solver):
         c = self.pool.affine.numpy() * (0.25 * np.array(self.grid.dx) ** 2)
         turn = np.stack([c[:, 2, 1] - c[:, 1, 2], c[:, 0, 2] - c[:, 2, 0], c[:, 1, 0] - c[:, 0, 1]], axis=1)
         return self.pool.mass.numpy()[:, None] * turn
+
+    def shear_stresses(self) -> np.ndarray | None:
+        return shear_stress(self.scene, self.pool)
 
     def footprint(self) -> dict[str, int]:
         names = ("table", "block_of", "raw", "moving", *(["fill"] if self.scene.expands else []))

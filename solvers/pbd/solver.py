@@ -14,9 +14,9 @@ from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound
 
 from .. import aging, neighbours
-from ..aging import present_density
 from ..neighbours import FAULT_NEIGHBOURS, Neighbours, crowded
 from ..order import CellOrder
+from ..readout import present_density
 from ..smoothing import spiky
 from . import bonds, laws
 from . import kernels_warp as kernels

@@ -17,6 +17,7 @@ from fluidbench.timestep import Bound
 from .. import aging, neighbours
 from ..neighbours import FAULT_NEIGHBOURS, Neighbours, crowded
 from ..order import CellOrder
+from ..readout import shear_stress
 from ..smoothing import wendland_slope
 from . import kernels_warp as kernels
 
@@ -230,6 +231,9 @@ class SolverSPH(Solver):
 
     def densities(self) -> np.ndarray:
         return self.pool.density.numpy()
+
+    def shear_stresses(self) -> np.ndarray | None:
+        return shear_stress(self.scene, self.pool)
 
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}

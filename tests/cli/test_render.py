@@ -41,7 +41,7 @@ def test_a_run_is_rendered_filmed_and_exported(tower):
     pytest.importorskip("pyvista")
     imageio = pytest.importorskip("imageio.v2")
     _, folder = tower
-    done = fluidbench("render", str(folder), "--no-turntable", "--film", "--export", "--colour", "speed")
+    done = fluidbench("render", str(folder), "--no-turntable", "--film", "--export", "--colour", "stress")
     assert done.returncode == 0, done.stdout + done.stderr
     image = np.asarray(imageio.imread(folder / "render.png"))
     assert image.shape[:2] == (960, 1280) and image.std() > 5
