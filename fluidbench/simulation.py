@@ -11,7 +11,7 @@ import warp as wp
 
 from . import health
 from .device import CountedLaunches
-from .errors import UserError
+from .errors import UserError, suggestion
 from .health import Health, Vital
 from .layout import capacity_of, emitted, generations
 from .particles import OutOfCapacity, Pool
@@ -64,11 +64,14 @@ class Simulation:
 
     def __init__(
         self, scenarios: Scenario | Sequence[Scenario], method: str | type[Solver], device: str = "cpu",
-        backend: str = "warp", config: Any = None, graphs: bool = True,
+        backend: str = "warp", threads: int = 1, config: Any = None, graphs: bool = True,
     ) -> None:  # fmt: skip
         solver_class = get_solver(method) if isinstance(method, str) else method
-        if backend != "warp":
-            raise UserError(f"no backend '{backend}'; there is warp")
+        if backend not in solver_class.backends:
+            raise UserError(
+                f"{solver_class.name} has no backend '{backend}'{suggestion(backend, solver_class.backends)}; it has "
+                f"{' and '.join(solver_class.backends)}"
+            )
         self.scene = Scene(scenarios, device)
         self.scenario = self.scene.scenario
         self.config = configure(solver_class, self.scenario) if config is None else config
@@ -82,7 +85,7 @@ class Simulation:
         growing = material.expansion is not None
         family = (emitted(self.scenario), generations(self.scenario)) if growing else ()
         self.growing = Growing(self.scene, self.pool, *family) if growing else None
-        self.solver = solver_class(self.scene, self.pool, self.config, backend)
+        self.solver = solver_class(self.scene, self.pool, self.config, backend, threads)
         self.curing = Curing(self.scene, self.pool, self.solver.harden) if material.cure is not None else None
         self.contact = Contact(self.scene, self.pool) if self.scenario.collider is not None else None
         self.health = Health(self.scene, self.pool)
@@ -95,7 +98,7 @@ class Simulation:
         self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
         self._graphs: dict[int, Any] = {}
         self.substep_launches, self.process_launches = CountedLaunches(), CountedLaunches()
-        self._use_graphs = graphs
+        self._use_graphs = graphs and backend == "warp"
 
     @property
     def now(self) -> float:
@@ -183,8 +186,7 @@ class Simulation:
     def _run(self, substeps: int) -> None:
         """Replay `substeps` substeps: one graph a substep on the CPU, where replay is free, one for all on CUDA."""
         if not self._use_graphs:
-            for _ in range(substeps):
-                self._substep()
+            self._launch(substeps)
             return
         each = 1 if self.scene.device.is_cpu else substeps
         if each not in self._graphs:
@@ -196,6 +198,20 @@ class Simulation:
             self._graphs[each] = capture.graph
         for _ in range(substeps // each):
             wp.capture_launch(self._graphs[each])
+
+    def _launch(self, substeps: int) -> None:
+        """Launch `substeps` substeps one by one, between those of Warp that came before and come after."""
+        self._wait()
+        self.substep_launches = CountedLaunches()
+        with self.substep_launches:
+            for _ in range(substeps):
+                self._substep()
+        self.substep_launches.count //= substeps
+        self._wait()
+
+    def _wait(self) -> None:
+        if self.solver.backend is not None:
+            self.solver.backend.wait()
 
     def footprint(self) -> dict[str, int]:
         """Bytes by part of everything allocated: the pool, the method, and each process that is on."""

@@ -57,6 +57,8 @@ class Solver(ABC):
     Config: ClassVar[type[Config]]
     passes: ClassVar[tuple[str, ...]]
     faults: ClassVar[dict[int, str]] = {}
+    backends: ClassVar[tuple[str, ...]] = ("warp",)
+    backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
     typical_rate: ClassVar[float] = 1.0e6  # particle-substeps a second on one core, for estimates only
     typical_bytes: ClassVar[float] = 300.0  # bytes a particle, for estimates only
 
@@ -76,14 +78,16 @@ class Solver(ABC):
         """Every limit on dt for matter moving at up to `speed` [m/s], by name, formula and source."""
 
     @abstractmethod
-    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
-        """Allocate everything the method needs: nothing is allocated later."""
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
+        """Allocate everything the method needs: nothing is allocated later. `backend` is one of `backends`; `threads`
+        are those of the CPU, for a backend that can use several."""
 
     @abstractmethod
     def substep(self) -> None:
         """Enqueue the passes that advance every particle by `scene.dt`.
 
-        No host synchronisation, no allocation and no branch on device data: the whole call is captured as a graph.
+        No host synchronisation, no allocation and no branch on device data: with Warp the whole call is captured as a
+        graph.
         """
 
     def prepare(self) -> None:  # noqa: B027

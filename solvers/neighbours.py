@@ -14,6 +14,8 @@ from fluidbench.expansion import Expansion
 from fluidbench.particles import Pool
 from fluidbench.scene import PERIODIC, STICK, Box, Scene
 
+from .backends import Backend
+
 wp.set_module_options({"enable_backward": False})
 INDEX_BITS = wp.constant(26)
 INDEX_MASK = wp.constant(2**26 - 1)
@@ -260,23 +262,27 @@ def fill_lists(
 class Neighbours:
     """Lists of all pairs within `radius`, valid while nothing has moved more than half of `skin` (both [m])."""
 
-    def __init__(self, scene: Scene, pool: Pool, radius: float, skin: float) -> None:
-        self.scene, self.pool = scene, pool
+    def __init__(self, scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> None:
+        self.scene, self.pool, self.backend = scene, pool, backend
         self.limit = limit = room((radius + skin) / scene.spacing)
         self.reach, self.half_skin2 = radius + skin, (0.5 * skin) ** 2
         # On the CPU a particle's list is contiguous; on a GPU the k-th entries of neighbouring threads are.
         self.row, self.column = (limit, 1) if scene.device.is_cpu else (1, pool.size)
         with wp.ScopedDevice(scene.device):
-            self.grid = wp.HashGrid(*_grid_shape(pool.capacity * scene.worlds))
-            self.grid.reserve(pool.size, with_groups=True)
             self.entries = wp.empty(pool.size * limit, dtype=int)
             self.number = wp.zeros(pool.size, dtype=int)
             self.listed = wp.zeros(pool.size, dtype=wp.vec3)
-            self.group = wp.zeros(pool.size, dtype=int)
             self.outdated = wp.ones(1, dtype=int)
         self.lists = Lists()
         self.lists.entries, self.lists.number = self.entries, self.number
         self.lists.row, self.lists.column = self.row, self.column
+        self._allocate_grid()
+
+    def _allocate_grid(self) -> None:
+        with wp.ScopedDevice(self.scene.device):
+            self.group = wp.zeros(self.pool.size, dtype=int)
+            self.grid = wp.HashGrid(*_grid_shape(self.pool.size))
+            self.grid.reserve(self.pool.size, with_groups=True)
 
     def refresh(self) -> None:
         """The pool was changed from outside: make the lists anew at the next substep."""
@@ -321,6 +327,15 @@ class Neighbours:
 
     def footprint(self) -> dict[str, int]:
         return {"neighbour lists": self.entries.capacity + self.number.capacity + self.listed.capacity}
+
+
+def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> Neighbours:
+    """Lists found by a backend's own search."""
+    if backend.name == "taichi":
+        from .neighbours_taichi import TaichiNeighbours
+
+        return TaichiNeighbours(scene, pool, backend, radius, skin)
+    return Neighbours(scene, pool, backend, radius, skin)
 
 
 def room(reach_ratio: float) -> int:

@@ -365,12 +365,15 @@ def g2p(
 
 @functools.cache
 def passes(expands: bool) -> SimpleNamespace:
-    """The passes that differ where matter expands, each compiled for one case: unused physics costs nothing."""
+    """All passes, those that differ where matter expands compiled for this case: unused physics costs nothing."""
     options = {"fast_math": True, "enable_backward": False}
-    return SimpleNamespace(**{
+    special = {
         law.__name__: wp.kernel(
             rebound(law, {"EXPANDS": expands}), name=f"{law.__name__}_{'expanding' if expands else 'plain'}",
             module="unique", module_options=options,
         )
         for law in (p2g, grid_step)
-    })  # fmt: skip
+    }  # fmt: skip
+    return SimpleNamespace(
+        reset_blocks=reset_blocks, find_blocks=find_blocks, clear_grid=clear_grid, g2p=g2p, **special
+    )

@@ -1,6 +1,7 @@
 """The material point method: allocation, bounds and the order of passes."""
 
 import math
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -14,6 +15,7 @@ from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound, damped_limit
 
 from .. import aging
+from ..backends import NAMES, backend_of
 from ..order import CellOrder
 from ..readout import present_density, shear_stress
 from . import kernels_warp as kernels
@@ -40,6 +42,7 @@ class SolverMPM(Solver):
     name = "mpm"
     paradigm = "hybrid: particles carry state, a background grid carries momentum"
     features = frozenset(Feature)
+    backends: ClassVar = NAMES
     Config: ClassVar = ConfigMPM
     passes = ("clear_grid", "p2g", "grid_step", "g2p")
     faults: ClassVar = {
@@ -72,9 +75,11 @@ class SolverMPM(Solver):
             ]
         return limits
 
-    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.kernels = kernels.passes(scene.expands)
+        self.backend = backend_of(backend, scene.device, threads)
+        self.threads = threads
+        self.kernels = self.kernels_of(backend)
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
         self.feedback = kernels.Feedback()
         self.feedback.rate = config.volume_feedback / min(self.grid.dx)
@@ -98,25 +103,27 @@ class SolverMPM(Solver):
         )  # particles of one cell share their 27 nodes
         self.node_lanes = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
 
-    def refresh(self) -> None:
-        pool, device = self.pool, self.scene.device
-        wp.launch(
-            kernels.reset_blocks,
-            self.node_lanes,
-            [self.table, self.block_of, self.active, self.node_lanes],
-            device=device,
-        )
-        self.active.zero_()
-        wp.launch(
-            kernels.find_blocks,
-            pool.size,
-            [self.grid, pool.capacity, pool.count, pool.position],
-            [self.table, self.block_of, self.active, pool.fault],
-            device=device,
-        )
+    def kernels_of(self, backend: str) -> SimpleNamespace:
+        """The passes in a backend's language, compiled for this scene."""
+        if backend == "taichi":
+            from . import kernels_taichi
 
+            return kernels_taichi.passes(self.scene.expands, alone=self.scene.device.is_cpu and self.threads == 1)
+        return kernels.passes(self.scene.expands)
+
+    def refresh(self) -> None:
+        pool = self.pool
+        self._launch("reset_blocks", self.node_lanes, [self.table, self.block_of, self.active, self.node_lanes])
+        self.active.zero_()
+        self._launch(
+            "find_blocks", pool.size, [self.grid, pool.capacity, pool.count, pool.position],
+            [self.table, self.block_of, self.active, pool.fault],
+        )  # fmt: skip
         if not self.started:
             self._start_affine()
+
+    def _launch(self, name: str, size: int, inputs: list[Any], outputs: list[Any] = [], block_dim: int = 256) -> None:  # noqa: B006
+        self.backend.launch(getattr(self.kernels, name), size, inputs, outputs, block_dim)
 
     def _start_affine(self) -> None:
         """Gather the affine field of the initial velocities: from zero, the first step would be a lossy PIC step.
@@ -127,6 +134,7 @@ class SolverMPM(Solver):
         velocity = wp.clone(self.pool.velocity)
         for name in self.passes:
             getattr(self, name)()
+        self.backend.wait()
         wp.copy(self.pool.velocity, velocity)
 
     def substep(self) -> None:
@@ -157,66 +165,45 @@ class SolverMPM(Solver):
 
     def clear_grid(self) -> None:
         for nodes in [self.raw, self.fill] if self.scene.expands else [self.raw]:
-            wp.launch(
-                kernels.clear_grid, self.node_lanes, [self.active, self.node_lanes, nodes], device=self.scene.device
-            )
+            self._launch("clear_grid", self.node_lanes, [self.active, self.node_lanes], [nodes])
 
     def p2g(self) -> None:
         pool, scene = self.pool, self.scene
-        wp.launch(
-            self.kernels.p2g,
+        self._launch(
+            "p2g",
             pool.size,
             [self.grid, pool.capacity, pool.count, scene.dt, scene.phases, pool.position, pool.velocity, pool.affine,
              pool.mass, pool.volume, pool.phase, pool.held, self.table],
             [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, self.fill, pool.fault],
-            device=scene.device,
             block_dim=128,
         )  # fmt: skip
 
     def grid_step(self) -> None:
-        wp.launch(
-            self.kernels.grid_step,
+        scene = self.scene
+        self._launch(
+            "grid_step",
             self.node_lanes,
-            [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.fill, self.scene.dt,
-             self.scene.force, self.scene.phases],
+            [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.fill, scene.dt,
+             scene.force, scene.phases],
             [self.moving],
-            device=self.scene.device,
         )  # fmt: skip
 
     def g2p(self) -> None:
-        pool = self.pool
-        wp.launch(
-            kernels.g2p,
+        pool, scene = self.pool, self.scene
+        self._launch(
+            "g2p",
             pool.size,
-            [
-                self.grid,
-                pool.capacity,
-                pool.count,
-                self.scene.dt,
-                self.moving,
-                self.scene.phases,
-                pool.phase,
-                pool.held,
-                self.feedback,
-            ],
-            [
-                pool.position,
-                pool.velocity,
-                pool.affine,
-                pool.volume_ratio,
-                self.table,
-                self.block_of,
-                self.active,
-                pool.fault,
-            ],
-            device=self.scene.device,
-        )
+            [self.grid, pool.capacity, pool.count, scene.dt, self.moving, scene.phases, pool.phase, pool.held,
+             self.feedback],
+            [pool.position, pool.velocity, pool.affine, pool.volume_ratio, self.table, self.block_of, self.active,
+             pool.fault],
+        )  # fmt: skip
 
     def prepare(self) -> None:
-        names = [kernels, *([aging] if self.scene.changes else [])]
-        names += [kernel.module.name for kernel in vars(self.kernels).values()]
-        for module in names:
-            wp.load_module(module, device=self.scene.device)
+        if self.scene.changes:
+            wp.load_module(aging, device=self.scene.device)
+        self.backend.prepare(self)
+        self.started = False
 
     def sort_keys(self) -> Any:
         return self.order.keys()

@@ -5,6 +5,7 @@ from that moment, in which bonds carry no stress. Central forces fix the Poisson
 Entry k of particle i is at k * slots + i; mirror images in slip walls are bonded too, since such walls hold.
 """
 
+from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
@@ -12,6 +13,7 @@ import warp as wp
 from fluidbench.particles import CARRIED, CLAMPED, FREE, Pool
 from fluidbench.scene import PERIODIC, SLIP, STICK, Box, Phase, Scene, is_solid
 
+from ..backends import Backend
 from ..bind import warp_func
 from ..neighbours import INDEX_BITS, INDEX_MASK, Lists, face_kind, image_code, image_position
 from . import laws
@@ -229,8 +231,8 @@ def yield_bonds(
 class Network:
     """The bonds of a pool: what is allocated for them and the passes that use them."""
 
-    def __init__(self, scene: Scene, pool: Pool) -> None:
-        self.scene, self.pool = scene, pool
+    def __init__(self, scene: Scene, pool: Pool, backend: Backend, kernels: SimpleNamespace) -> None:
+        self.scene, self.pool, self.backend, self.kernels = scene, pool, backend, kernels
         self.bonds = Bonds()
         with wp.ScopedDevice(scene.device):
             self.bonds.number = wp.zeros(pool.size, dtype=int)
@@ -242,23 +244,23 @@ class Network:
     def bind(self, lists: Any) -> None:
         pool, scene = self.pool, self.scene
         common = [scene.box, scene.spacing]
-        wp.launch(
-            awaken, pool.size,
+        self.backend.launch(
+            self.kernels.awaken, pool.size,
             [*common, pool.capacity, pool.count, scene.phases, pool.phase, pool.position, self.bonds],
-            [pool.held, pool.velocity], device=scene.device,
+            [pool.held, pool.velocity],
         )  # fmt: skip
-        wp.launch(
-            bind, pool.size, [*common, lists, pool.capacity, pool.count, pool.position, self.bonds], [pool.fault],
-            device=scene.device,
+        self.backend.launch(
+            self.kernels.bind, pool.size, [*common, lists, pool.capacity, pool.count, pool.position, self.bonds],
+            [pool.fault],
         )  # fmt: skip
 
     def stretch(self, sweep: int, correction: wp.array) -> None:
         pool, scene = self.pool, self.scene
-        wp.launch(
-            stretch, pool.size,
+        self.backend.launch(
+            self.kernels.stretch, pool.size,
             [scene.box, scene.spacing, sweep, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase, pool.held,
              pool.position, pool.mass, self.bonds],
-            [correction], device=scene.device,
+            [correction],
         )  # fmt: skip
 
     def relieve(self, due: wp.array) -> None:
@@ -271,10 +273,9 @@ class Network:
 
     def flow(self) -> None:
         pool, scene = self.pool, self.scene
-        wp.launch(
-            yield_bonds, pool.size,
+        self.backend.launch(
+            self.kernels.yield_bonds, pool.size,
             [pool.capacity, pool.count, scene.box, scene.phases, pool.phase, pool.position, self.bonds],
-            device=scene.device,
         )  # fmt: skip
 
     def footprint(self) -> dict[str, int]:

@@ -6,6 +6,8 @@ yield stress: one Jacobi step a substep, `strain` and `pull`. Solids are held by
 viscosity is mapped onto velocity smoothing (laws.smoothing_weight).
 """
 
+from types import SimpleNamespace
+
 import warp as wp
 
 from fluidbench.particles import CARRIED
@@ -18,7 +20,7 @@ from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky, spiky_slope
 from . import laws
-from .bonds import bonded
+from .bonds import awaken, bind, bonded, stretch, yield_bonds
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -356,3 +358,9 @@ def rub(
                 v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
                 v[axis] = normal
         velocity[i] = v
+
+
+PASSES = SimpleNamespace(
+    predict=predict, multipliers=multipliers, correct=correct, apply=apply, velocities=velocities, strain=strain,
+    pull=pull, shear=shear, rub=rub, awaken=awaken, bind=bind, stretch=stretch, yield_bonds=yield_bonds,
+)  # fmt: skip

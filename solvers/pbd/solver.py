@@ -1,6 +1,7 @@
 """Position-based dynamics: allocation, bounds and the order of passes."""
 
 import math
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -14,7 +15,8 @@ from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound
 
 from .. import aging, neighbours
-from ..neighbours import FAULT_NEIGHBOURS, Neighbours, crowded
+from ..backends import NAMES, backend_of
+from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
 from ..order import CellOrder
 from ..readout import present_density
 from ..smoothing import spiky
@@ -52,6 +54,7 @@ class SolverPBD(Solver):
     name = "pbd"
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
     features = frozenset(Feature) - {Feature.PRESSURE}
+    backends: ClassVar = NAMES
     Config: ClassVar = ConfigPBD
     faults: ClassVar = {
         FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full",
@@ -115,8 +118,10 @@ class SolverPBD(Solver):
             limits.append(Bound("free fall", (a * d / g) ** 0.5, f"sqrt({a:g} d / |g|)", "same, from rest"))
         return limits
 
-    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
+        self.backend = backend_of(backend, scene.device, threads)
+        self.kernels = self.kernels_of(backend)
         self.num = kernels.Numbers()
         self.num.support = config.support_ratio * scene.spacing
         self.num.spacing = scene.spacing
@@ -130,7 +135,7 @@ class SolverPBD(Solver):
         if scene.flowing:
             pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
             pool.add_field("elastic_shear", wp.vec3)
-        self.network = bonds.Network(scene, pool) if bonds.needed(scene) else None
+        self.network = bonds.Network(scene, pool, self.backend, self.kernels) if bonds.needed(scene) else None
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)
@@ -138,9 +143,17 @@ class SolverPBD(Solver):
             self.multiplier = wp.zeros(pool.size, dtype=float)
             self.fill = wp.ones(pool.size, dtype=float)
             self.stress = wp.zeros(pool.size if scene.flowing else 1, dtype=wp.mat33)
-        self.neighbours = Neighbours(scene, pool, self.num.support, config.skin * scene.spacing)
+        self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, config.skin * scene.spacing)
         self.pairs = self.neighbours.lists
         self.order = CellOrder(scene, pool, self.num.support)
+
+    def kernels_of(self, backend: str) -> SimpleNamespace:
+        """The passes in a backend's language."""
+        if backend == "taichi":
+            from . import kernels_taichi
+
+            return kernels_taichi.PASSES
+        return kernels.PASSES
 
     def refresh(self) -> None:
         self.neighbours.refresh()
@@ -171,26 +184,32 @@ class SolverPBD(Solver):
         if self.rubs:
             self.rub()
 
-    def _launch(self, kernel: wp.Kernel, inputs: list[Any], outputs: list[Any]) -> None:
-        wp.launch(kernel, self.pool.size, inputs, outputs, device=self.scene.device)
+    def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
+        self.backend.launch(kernel, self.pool.size, inputs, outputs)
 
     def _active(self) -> list[Any]:
         return [self.pool.capacity, self.pool.count]
 
     def swell(self) -> None:
-        self._launch(aging.swell, [*self._active(), self.scene.dt, self.pool.growth], [self.pool.volume])
+        wp.launch(
+            aging.swell, self.pool.size, [*self._active(), self.scene.dt, self.pool.growth], [self.pool.volume],
+            device=self.scene.device,
+        )  # fmt: skip
 
     def harden(self, due: wp.array) -> None:
         pool, flowing = self.pool, self.scene.flowing
         tensor = [pool.elastic_normal, pool.elastic_shear] if flowing else [self.motion, self.motion]
         if self.network is not None:
             self.network.relieve(due)
-        self._launch(aging.harden, [int(flowing), *self._active(), self.scene.phases, due], [pool.phase, *tensor])
+        wp.launch(
+            aging.harden, pool.size, [int(flowing), *self._active(), self.scene.phases, due], [pool.phase, *tensor],
+            device=self.scene.device,
+        )  # fmt: skip
 
     def predict(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
-            kernels.predict,
+            self.kernels.predict,
             [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held, pool.velocity],
             [pool.position, self.motion],
         )
@@ -209,7 +228,7 @@ class SolverPBD(Solver):
     def multipliers(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
-            kernels.multipliers,
+            self.kernels.multipliers,
             [self.num, scene.box, self.pairs, *self._active(), scene.phases, pool.phase, pool.position, pool.volume],
             [self.multiplier, self.fill],
         )
@@ -217,7 +236,7 @@ class SolverPBD(Solver):
     def correct(self) -> None:
         pool = self.pool
         self._launch(
-            kernels.correct,
+            self.kernels.correct,
             [self.num, self.scene.box, self.pairs, *self._active(), pool.held, pool.position, pool.volume,
              self.multiplier],
             [self.correction],
@@ -226,7 +245,7 @@ class SolverPBD(Solver):
     def apply(self) -> None:
         pool = self.pool
         self._launch(
-            kernels.apply,
+            self.kernels.apply,
             [self.num, self.scene.box, *self._active(), pool.held, self.correction],
             [pool.position, self.motion],
         )
@@ -234,7 +253,7 @@ class SolverPBD(Solver):
     def velocities(self) -> None:
         pool = self.pool
         self._launch(
-            kernels.velocities,
+            self.kernels.velocities,
             [*self._active(), self.scene.dt, pool.held, self.motion],
             [pool.velocity],
         )
@@ -242,7 +261,7 @@ class SolverPBD(Solver):
     def strain(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
-            kernels.strain,
+            self.kernels.strain,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
              pool.position, pool.mass, pool.volume, pool.velocity],
             [pool.elastic_normal, pool.elastic_shear, self.stress],
@@ -251,7 +270,7 @@ class SolverPBD(Solver):
     def pull(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
-            kernels.pull,
+            self.kernels.pull,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, pool.held, pool.position, pool.mass,
              pool.volume, self.stress, pool.velocity],
             [self.smoothed],
@@ -261,7 +280,7 @@ class SolverPBD(Solver):
     def shear(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
-            kernels.shear,
+            self.kernels.shear,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
              pool.position, pool.mass, pool.volume, pool.velocity],
             [self.smoothed],
@@ -271,15 +290,16 @@ class SolverPBD(Solver):
     def rub(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
-            kernels.rub,
+            self.kernels.rub,
             [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.phases, pool.phase, scene.force,
              pool.position],
             [pool.velocity],
         )  # fmt: skip
 
     def prepare(self) -> None:
-        for module in (kernels, neighbours, aging, *([bonds] if self.network else [])):
+        for module in (neighbours, aging):
             wp.load_module(module, device=self.scene.device)
+        self.backend.prepare(self)
 
     def sort_keys(self) -> Any:
         return self.order.keys() if self.network is None else None  # bonds name their partners by slot

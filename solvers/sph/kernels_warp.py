@@ -302,6 +302,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
     return SimpleNamespace(
         strain=_named(strain, name),
         force=_named(force, name),
+        move=move,
     )
 
 

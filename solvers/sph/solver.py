@@ -1,6 +1,7 @@
 """Weakly compressible SPH: allocation, bounds and the order of passes."""
 
 import math
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -15,7 +16,8 @@ from fluidbench.solver import Config, Feature, Solver
 from fluidbench.timestep import Bound
 
 from .. import aging, neighbours
-from ..neighbours import FAULT_NEIGHBOURS, Neighbours, crowded
+from ..backends import NAMES, backend_of
+from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
 from ..order import CellOrder
 from ..readout import shear_stress
 from ..smoothing import wendland_slope
@@ -61,6 +63,7 @@ class SolverSPH(Solver):
     name = "sph"
     paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
     features = frozenset(Feature)
+    backends: ClassVar = NAMES
     Config: ClassVar = ConfigSPH
     passes = ("lists", "strain", "force", "move")
     OWN: ClassVar = ("new_density", "load", "stress", "rate", "acceleration")
@@ -106,9 +109,10 @@ class SolverSPH(Solver):
             ),
         ]
 
-    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp") -> None:
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.kernels = kernels.passes(scene.elastic, scene.viscous, scene.changes)
+        self.backend = backend_of(backend, scene.device, threads)
+        self.kernels = self.kernels_of(backend)
         self.num = kernels.Smoothing()
         self.num.h = config.smoothing(scene.elastic) * scene.spacing
         self.num.spacing = scene.spacing
@@ -133,9 +137,18 @@ class SolverSPH(Solver):
             self.stress = wp.zeros(solid, dtype=wp.mat33)
             self.rate = wp.zeros(solid, dtype=wp.mat33)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
-        self.neighbours = Neighbours(scene, pool, 2.0 * self.num.h, config.skin * self.num.h)
+        self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
         self.pairs = self.neighbours.lists
         self.order = CellOrder(scene, pool, self.num.h)
+
+    def kernels_of(self, backend: str) -> SimpleNamespace:
+        """The passes in a backend's language, compiled for this scene."""
+        variant = self.scene.elastic, self.scene.viscous, self.scene.changes
+        if backend == "taichi":
+            from . import kernels_taichi
+
+            return kernels_taichi.passes(*variant)
+        return kernels.passes(*variant)
 
     def _rest_densities(self) -> None:
         """Every slot starts at its world's rest density."""
@@ -179,52 +192,37 @@ class SolverSPH(Solver):
     def strain(self) -> None:
         pool = self.pool
         elastic = [pool.elastic_normal, pool.elastic_shear] if self.scene.elastic else [self.unused, self.unused]
-        wp.launch(
+        self.backend.launch(
             self.kernels.strain,
             pool.size,
             [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.volume, pool.density, pool.lift],
             [*elastic, self.new_density, self.load, self.stress, self.rate],
-            device=self.scene.device,
         )
 
     def force(self) -> None:
         pool = self.pool
-        wp.launch(
+        self.backend.launch(
             self.kernels.force,
             pool.size,
             [*self._common(), self.scene.force, pool.position, pool.velocity, pool.mass, pool.volume, self.new_density,
              self.load, self.stress, self.rate],
             [self.acceleration],
-            device=self.scene.device,
         )  # fmt: skip
 
     def move(self) -> None:
         pool, scene = self.pool, self.scene
-        wp.launch(
-            kernels.move,
+        self.backend.launch(
+            self.kernels.move,
             pool.size,
-            [
-                scene.box,
-                scene.spacing,
-                pool.capacity,
-                pool.count,
-                scene.dt,
-                scene.phases,
-                pool.phase,
-                scene.force,
-                pool.held,
-                pool.mass,
-                pool.volume,
-                self.acceleration,
-                self.new_density,
-            ],
+            [scene.box, scene.spacing, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase, scene.force,
+             pool.held, pool.mass, pool.volume, self.acceleration, self.new_density],
             [pool.position, pool.velocity, pool.density, pool.lift],
-            device=scene.device,
-        )
+        )  # fmt: skip
 
     def prepare(self) -> None:
-        for module in (kernels, neighbours, aging, self.kernels.strain.module, self.kernels.force.module):
-            wp.load_module(module if hasattr(module, "__file__") else module.name, device=self.scene.device)
+        for module in (neighbours, aging):
+            wp.load_module(module, device=self.scene.device)
+        self.backend.prepare(self)
 
     def sort_keys(self) -> Any:
         return self.order.keys()

@@ -50,7 +50,7 @@ class Ballistic(Solver):
     def bounds(cls, scenario, config, speed) -> list[Bound]:
         return [Bound("advective", scenario.spacing / speed, "d / v", "one spacing")]
 
-    def __init__(self, scene, pool, config, backend="warp") -> None:
+    def __init__(self, scene, pool, config, backend="warp", threads=1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
 
     def substep(self) -> None:

@@ -1,0 +1,66 @@
+"""Where a method's passes run: in Warp, or in Taichi on the same memory.
+
+A solver says which pass it wants and with what; kernel files of both languages export the same names with the same
+arguments. Taichi is imported only where it is asked for.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import warp as wp
+
+from fluidbench.errors import UserError
+
+NAMES = ("warp", "taichi")
+
+
+class Backend(Protocol):
+    """Launches kernels; a kernel's arguments are the inputs, then the outputs."""
+
+    name: str
+
+    def launch(
+        self, kernel: Any, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
+    ) -> None: ...
+
+    def prepare(self, solver: Any) -> None:
+        """Compile all kernels of a solver (`solver.kernels`)."""
+        ...
+
+    def wait(self) -> None:
+        """Until everything launched on this memory is done, by whomever."""
+        ...
+
+
+class Warp:
+    """Warp's launches, which a graph may capture; one thread on the CPU."""
+
+    name = "warp"
+
+    def __init__(self, device: wp.Device) -> None:
+        self.device = device
+
+    def launch(
+        self, kernel: Any, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
+    ) -> None:
+        wp.launch(kernel, size, inputs, outputs, device=self.device, block_dim=block_dim)
+
+    def prepare(self, solver: Any) -> None:
+        for name in {kernel.module.name for kernel in vars(solver.kernels).values()}:
+            wp.load_module(name, device=self.device)
+
+    def wait(self) -> None:
+        wp.synchronize_device(self.device)
+
+
+def backend_of(name: str, device: wp.Device, threads: int) -> Backend:
+    """The backend of this name on a device; raises UserError where it is not installed."""
+    if name == "warp":
+        return Warp(device)
+    try:
+        from .taichi_bridge import Taichi
+    except ImportError:
+        raise UserError(
+            "the backend taichi is not installed: pip install taichi (its wheels end at Python 3.13)"
+        ) from None
+    return Taichi(device, threads)

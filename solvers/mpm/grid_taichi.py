@@ -1,0 +1,242 @@
+"""The background grid of MPM and its walls, in Taichi: what grid.py and walls.py say, written anew.
+
+Functions over `axis` are unrolled: it is known when they are compiled.
+"""
+
+import taichi as ti
+
+from fluidbench.scene import FRICTION, PERIODIC, STICK
+
+from ..taichi_bridge import ivec3, struct_of, vec3, vec4
+from .grid import FAULT_BLOCKS, FIRST, Grid
+from .walls import CONTACT_BEGINS, CONTACT_ENDS
+
+GridT = struct_of(Grid)
+
+
+@ti.func
+def base_node(grid, x):
+    """The lowest of the 27 nodes around a point, before wrapping."""
+    return ti.floor((x - grid.origin) * grid.inv_dx - 0.5, ti.i32)
+
+
+@ti.func
+def wrapped(grid, node):
+    """The same node within the periods of periodic axes."""
+    out = node
+    for axis in ti.static(range(3)):
+        if grid.wrap[axis] > 0:
+            if node[axis] < grid.first[axis]:
+                out[axis] += grid.wrap[axis]
+            elif node[axis] >= grid.first[axis] + grid.wrap[axis]:
+                out[axis] -= grid.wrap[axis]
+    return out
+
+
+@ti.func
+def block_at(grid, world, node):
+    """Number of a node's block, over all worlds."""
+    inside = ((node[0] >> 2) * grid.blocks[1] + (node[1] >> 2)) * grid.blocks[2] + (node[2] >> 2)
+    return world * grid.blocks_per_world + inside
+
+
+@ti.func
+def address(grid, world, node, table: ti.template()):
+    """Where a node's values are; negative where its block has no slot."""
+    slot = table[block_at(grid, world, node)] - 1
+    return slot * 64 + ((node[0] & 3) * 16 + (node[1] & 3) * 4 + (node[2] & 3))
+
+
+@ti.func
+def node_at(grid, block, local):
+    """The node from its block's number within the world and its place within the block."""
+    across = block // grid.blocks[2]
+    corner = 4 * ivec3(across // grid.blocks[1], across % grid.blocks[1], block % grid.blocks[2])
+    return corner + ivec3(local // 16, (local // 4) % 4, local % 4)
+
+
+@ti.func
+def claim(
+    grid, world, base, table: ti.template(), block_of: ti.template(), active: ti.template(), fault: ti.template()
+):
+    """List the blocks of a stencil that have no slot yet and mark them -1; `number_blocks` gives them their slots."""
+    for corner in range(8):
+        node = wrapped(grid, base + 2 * ivec3(corner // 4, (corner // 2) % 2, corner % 2))
+        block = block_at(grid, world, node)
+        if table[block] == 0:
+            if ti.atomic_min(table[block], -1) == 0:
+                slot = ti.atomic_add(active[0], 1)
+                if slot < block_of.shape[0]:
+                    block_of[slot] = block
+                else:
+                    ti.atomic_or(fault[0], FAULT_BLOCKS)
+
+
+@ti.func
+def slots_in_use(active: ti.template(), block_of: ti.template()):
+    return ti.min(active[0], block_of.shape[0])
+
+
+@ti.func
+def content(grid, world, node, table: ti.template(), raw: ti.template()):
+    """What was scattered to a node; zero where no block is active."""
+    at = address(grid, world, node, table)
+    value = vec4(0.0)
+    if at >= 0:
+        value = raw[at]
+    return value
+
+
+@ti.func
+def mirrors(kind):
+    """Slip and stick walls are mirrors; rough walls let material lift off."""
+    return kind != FRICTION and kind != PERIODIC
+
+
+@ti.func
+def kind_near(grid, node, axis: ti.template()):
+    """Kind of the wall nearest to a node on an axis."""
+    kind = grid.upper_kind[axis]
+    if 2 * (node[axis] - FIRST) < grid.cells[axis]:
+        kind = grid.lower_kind[axis]
+    return kind
+
+
+@ti.func
+def near(grid, node, axis: ti.template()):
+    """Whether a node is on, one in front of, or behind a wall of this axis."""
+    return node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
+
+
+@ti.func
+def near_any(grid, node):
+    found = False
+    for axis in ti.static(range(3)):
+        if grid.lower_kind[axis] != PERIODIC and near(grid, node, axis):
+            found = True
+    return found
+
+
+@ti.func
+def contact(grid, world, node, axis: ti.template(), rest, table: ti.template(), fill: ti.template()):
+    """Share, 0 to 1, with which the wall nearest to a node acts: all of it for mirrors, none for periodic axes, and by
+    how full the wall's own node is for rough and no-slip walls."""
+    kind = kind_near(grid, node, axis)
+    share = 1.0
+    if kind == PERIODIC:
+        share = 0.0
+    elif kind == FRICTION or kind == STICK:
+        on_wall = node
+        on_wall[axis] = FIRST
+        if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
+            on_wall[axis] = FIRST + grid.cells[axis]
+        # half of the cell of a node on a wall lies inside
+        filled = 2.0 * content(grid, world, on_wall, table, fill)[3] * grid.inv_volume / rest
+        share = ti.math.clamp((filled - CONTACT_BEGINS) / (CONTACT_ENDS - CONTACT_BEGINS), 0.0, 1.0)
+    return share
+
+
+@ti.func
+def in_front(grid, node, axis: ti.template()):
+    """Index, on one axis, of the node whose image in a mirroring wall this node is; its own where it is none."""
+    i, last = node[axis], FIRST + grid.cells[axis]
+    if i < FIRST and mirrors(grid.lower_kind[axis]):
+        i = 2 * FIRST - i
+    elif i > last and mirrors(grid.upper_kind[axis]):
+        i = 2 * last - i
+    return i
+
+
+@ti.func
+def behind(grid, node, axis: ti.template()):
+    """Index, on one axis, of the ghost node that a mirroring wall folds onto this one; its own where there is none."""
+    i, last = node[axis], FIRST + grid.cells[axis]
+    if node[axis] == FIRST + 1 and mirrors(grid.lower_kind[axis]):
+        i = FIRST - 1
+    if node[axis] == last - 1 and mirrors(grid.upper_kind[axis]):
+        i = last + 1
+    return i
+
+
+@ti.func
+def seen_in_wall(value, axis: ti.template(), kind):
+    """A momentum or velocity as its mirror image: slip turns the normal component round, stick all three."""
+    out = value
+    for a in ti.static(range(3)):
+        if kind == STICK or a == axis:
+            out[a] = -value[a]
+    return out
+
+
+@ti.func
+def folded(grid, world, node, touching, table: ti.template(), raw: ti.template()):
+    """Content of a node with that of its ghosts behind mirroring walls, seen in them, added."""
+    ghost = node
+    for axis in ti.static(range(3)):
+        if touching[axis] == 1:
+            ghost[axis] = behind(grid, node, axis)
+    total = vec4(0.0)
+    for subset in range(8):
+        exists = True
+        at = node
+        for axis in ti.static(range(3)):
+            if (subset >> axis) & 1 == 1:
+                exists = exists and ghost[axis] != node[axis]
+                at[axis] = ghost[axis]
+        if exists:
+            value = content(grid, world, at, table, raw)
+            for axis in ti.static(range(3)):
+                if (subset >> axis) & 1 == 1:
+                    value = seen_in_wall(value, axis, kind_near(grid, at, axis))
+            total += value
+    return total
+
+
+@ti.func
+def bounded(grid, node, touching, velocity):
+    """A velocity that keeps out of the walls that a node lies on: none through them, none along no-slip walls, and
+    along rough ones less by up to friction times what was stopped (Coulomb)."""
+    v = velocity
+    for axis in ti.static(range(3)):
+        low, high = node[axis] <= FIRST, node[axis] >= FIRST + grid.cells[axis]
+        if touching[axis] == 1 and (low or high):
+            kind, friction, outward = grid.lower_kind[axis], grid.lower_friction[axis], -1.0
+            if high:
+                kind, friction, outward = grid.upper_kind[axis], grid.upper_friction[axis], 1.0
+            into = outward * v[axis]
+            if kind == STICK:
+                v = vec3(0.0)
+            elif kind != FRICTION:
+                v[axis] = 0.0
+            elif into > 0.0:
+                v[axis] = 0.0
+                v *= 1.0 - ti.min(friction * into / ti.max(v.norm(), 1.0e-12), 1.0)
+    return v
+
+
+@ti.func
+def share_inside(grid, node):
+    """Inverse of the part of a node's cell that lies inside the walls."""
+    share = 1.0
+    for axis in ti.static(range(3)):
+        on = node[axis] == FIRST or node[axis] == FIRST + grid.cells[axis]
+        if on and grid.lower_kind[axis] != PERIODIC:
+            share *= 2.0
+    return share
+
+
+@ti.func
+def contained(grid, x):
+    """A position wrapped along periodic axes and kept in front of walls."""
+    out = x
+    for axis in ti.static(range(3)):
+        low, high = grid.lower[axis], grid.upper[axis]
+        if grid.wrap[axis] > 0:
+            if x[axis] < low:
+                out[axis] += high - low
+            elif x[axis] >= high:
+                out[axis] -= high - low
+        else:
+            skin = 1.0e-3 * grid.dx[axis]
+            out[axis] = ti.math.clamp(x[axis], low + skin, high - skin)
+    return out

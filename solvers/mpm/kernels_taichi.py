@@ -1,0 +1,270 @@
+"""MLS-MPM in Taichi: the passes of kernels_warp.py with the same arguments, written anew from the same equations."""
+
+import functools
+from types import SimpleNamespace
+
+import taichi as ti
+
+from fluidbench.particles import CARRIED, CLAMPED, FREE
+
+from .. import constitutive
+from ..smoothing import quadratic_spline
+from ..taichi_bridge import (
+    Floats,
+    Forces,
+    Ints,
+    Matrices,
+    Phases,
+    Quads,
+    Vectors,
+    force_at,
+    is_solid,
+    ivec3,
+    mat3,
+    phase_at,
+    struct_of,
+    symmetric,
+    taichi_func,
+    vec3,
+    vec4,
+)
+from .grid_taichi import (
+    GridT,
+    address,
+    base_node,
+    bounded,
+    claim,
+    contact,
+    contained,
+    folded,
+    in_front,
+    kind_near,
+    near,
+    near_any,
+    node_at,
+    seen_in_wall,
+    share_inside,
+    slots_in_use,
+    wrapped,
+)
+from .kernels_warp import ANCHOR, ANCHORED, FAULT_STENCIL, Feedback
+
+pressure = taichi_func(constitutive.pressure)
+strain_and_flow = taichi_func(constitutive.strain_and_flow, constitutive.flow_stress)
+spline = taichi_func(quadratic_spline)
+FeedbackT = struct_of(Feedback)
+
+
+@ti.kernel
+def reset_blocks(table: Ints, block_of: Ints, active: Ints, lanes: int):
+    for slot in range(slots_in_use(active, block_of)):
+        table[block_of[slot]] = 0
+
+
+@ti.kernel
+def find_blocks(
+    grid: GridT, capacity: int, count: Ints, position: Vectors,
+    table: Ints, block_of: Ints, active: Ints, fault: Ints,
+):  # fmt: skip
+    known = slots_in_use(active, block_of)
+    for p in range(position.shape[0]):
+        world = p // capacity
+        if p - world * capacity < count[world]:
+            claim(grid, world, base_node(grid, position[p]), table, block_of, active, fault)
+    for slot in range(known, slots_in_use(active, block_of)):
+        table[block_of[slot]] = slot + 1
+
+
+@ti.kernel
+def clear_grid(active: Ints, lanes: int, raw: Quads):
+    for node in range(ti.min(active[0] * 64, raw.shape[0])):
+        raw[node] = vec4(0.0)
+
+
+@ti.func
+def weights(f):
+    """Spline weights of the three nodes (columns) on each axis (rows)."""
+    w = mat3(0.0)
+    for axis in ti.static(range(3)):
+        first, second, third = spline(f[axis])
+        w[axis, 0], w[axis, 1], w[axis, 2] = first, second, third
+    return w
+
+
+@ti.func
+def kirchhoff(phase, j, b, s, rate):
+    """tau = -J p 1 + G dev(b) + 2 min(J, 1) eta dev(D) [Pa]."""
+    unit = ti.Matrix.identity(ti.f32, 3)
+    p = pressure(1.0 / j - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+    tau = phase.shear_modulus * (symmetric(b, s) - (b.sum() / 3.0) * unit) - (j * p) * unit
+    if phase.viscosity > 0.0:
+        symmetrical = 0.5 * (rate + rate.transpose())
+        tau += (2.0 * ti.min(j, 1.0) * phase.viscosity) * (symmetrical - (rate.trace() / 3.0) * unit)
+    return tau
+
+
+@ti.func
+def strained(phase, c, b, s, h):
+    """The elastic tensor after a step under the velocity gradient c: its diagonal, and xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = strain_and_flow(
+        c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2], b[0], b[1], b[2], s[0], s[1],
+        s[2], phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
+        phase.relaxation_rate, h,
+    )  # fmt: skip
+    return vec3(xx, yy, zz), vec3(xy, xz, yz)
+
+
+@ti.kernel
+def g2p(
+    grid: GridT, capacity: int, count: Ints, dt: Floats, moving: Quads, phases: Phases, phase_of: Ints, held: Ints,
+    feedback: FeedbackT,
+    position: Vectors, velocity: Vectors, affine: Matrices, volume_ratio: Floats,
+    table: Ints, block_of: Ints, active: Ints, fault: Ints,
+):  # fmt: skip
+    known = slots_in_use(active, block_of)
+    for p in range(position.shape[0]):
+        world = p // capacity
+        if p - world * capacity < count[world]:
+            x, v, h = position[p], velocity[p], dt[world]
+            base = base_node(grid, x)
+            if held[p] != CARRIED:
+                f = (x - grid.origin) * grid.inv_dx - base
+                w = weights(f)
+                gathered, density = vec3(0.0), 0.0
+                moment = mat3(0.0)  # sum of w v (x_node - x) in cells
+                for o, q in ti.ndrange(3, 3):
+                    share = w[0, o] * w[1, q]
+                    for r in ti.static(range(3)):
+                        at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
+                        node = share * w[2, r] * moving[ti.max(at, 0)]
+                        u = vec3(node[0], node[1], node[2])
+                        gathered += u
+                        density += node[3]
+                        moment += u.outer_product(vec3(o, q, r) - f)
+                for a, b in ti.static(ti.ndrange(3, 3)):
+                    moment[a, b] *= 4.0 * grid.inv_dx[b]
+                affine[p] = moment
+                if held[p] == FREE:
+                    v = gathered
+                    velocity[p] = v
+                phase = phase_at(phases, world, phase_of[p])
+                crowding = volume_ratio[p] * density / phase.density - 1.0 - feedback.tolerance
+                if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
+                    volume_ratio[p] *= 1.0 - ti.min(h * feedback.rate * phase.wave_speed * crowding, 0.1)
+            free = x + h * v
+            x = contained(grid, free)
+            position[p] = x
+            for axis in ti.static(range(3)):
+                if x[axis] != free[axis] and grid.wrap[axis] == 0:
+                    velocity[p][axis] = 0.0
+            after = base_node(grid, x)
+            if (after != base).any():
+                claim(grid, world, after, table, block_of, active, fault)
+    for slot in range(known, slots_in_use(active, block_of)):
+        table[block_of[slot]] = slot + 1
+
+
+@functools.cache
+def passes(expands: bool, alone: bool) -> SimpleNamespace:
+    """All passes, those that differ where matter expands compiled for this case; a thread that is alone needs no atomic
+    additions, which would take half of its time."""
+
+    @ti.func
+    def add(target: ti.template(), at, value):
+        if ti.static(alone):
+            target[at] = target[at] + value
+        else:
+            target[at] += value
+
+    @ti.kernel
+    def p2g(
+        grid: GridT, capacity: int, count: Ints, dt: Floats, phases: Phases, position: Vectors, velocity: Vectors,
+        affine: Matrices, mass: Floats, volume: Floats, phase_of: Ints, held: Ints, table: Ints,
+        volume_ratio: Floats, elastic_normal: Vectors, elastic_shear: Vectors, raw: Quads, fill: Quads, fault: Ints,
+    ):  # fmt: skip
+        for p in range(position.shape[0]):
+            world = p // capacity
+            if p - world * capacity < count[world]:
+                h, c = dt[world], affine[p]
+                phase = phase_at(phases, world, phase_of[p])
+                inertia = mass[p]
+                if held[p] == CLAMPED:
+                    inertia *= ANCHOR
+                a = mat3(0.0)  # momentum per distance from the particle
+                if held[p] == FREE:
+                    a = inertia * c
+                if held[p] != CARRIED:
+                    j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
+                    b, s = elastic_normal[p], elastic_shear[p]
+                    if phase.shear_modulus > 0.0:
+                        b, s = strained(phase, c, b, s, h)
+                        elastic_normal[p], elastic_shear[p] = b, s
+                    volume_ratio[p] = j
+                    tau = kirchhoff(phase, j, b, s, c)
+                    for i, axis in ti.static(ti.ndrange(3, 3)):
+                        a[i, axis] -= 4.0 * h * volume[p] * grid.inv_dx[axis] * grid.inv_dx[axis] * tau[i, axis]
+                base = base_node(grid, position[p])
+                f = (position[p] - grid.origin) * grid.inv_dx - base
+                w = weights(f)
+                own = inertia * velocity[p]
+                for o, q in ti.ndrange(3, 3):
+                    for r in ti.static(range(3)):
+                        at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
+                        if at < 0:
+                            ti.atomic_or(fault[0], FAULT_STENCIL)
+                        else:
+                            share = w[0, o] * w[1, q] * w[2, r]
+                            momentum = share * (own + a @ ((vec3(o, q, r) - f) * grid.dx))
+                            add(raw, at, vec4(momentum[0], momentum[1], momentum[2], share * inertia))
+                            if ti.static(expands):
+                                add(fill, at, vec4(0.0, 0.0, 0.0, share * volume[p] * phase.density))
+
+    @ti.kernel
+    def grid_step(
+        grid: GridT, lanes: int, active: Ints, block_of: Ints, table: Ints, raw: Quads, fill: Quads, dt: Floats,
+        force: Forces, phases: Phases,
+        moving: Quads,
+    ):  # fmt: skip
+        for t in range(ti.min(active[0] * 64, raw.shape[0])):
+            block = block_of[t // 64]
+            world = block // grid.blocks_per_world
+            node = node_at(grid, block - world * grid.blocks_per_world, t % 64)
+            inside, touching, hold = node, ivec3(0), 1.0
+            total, fullness = raw[t], fill[t][3]
+            wall = near_any(grid, node)
+            if wall:
+                for axis in ti.static(range(3)):
+                    share = contact(grid, world, node, axis, phases[world, 0, 0], table, fill)
+                    if near(grid, node, axis) and share > 0.0:
+                        hold = ti.min(hold, share)
+                        touching[axis] = 1
+                        inside[axis] = in_front(grid, node, axis)
+                total = folded(grid, world, inside, touching, table, raw)
+                if ti.static(expands):
+                    fullness = folded(grid, world, inside, touching, table, fill)[3]
+            result = vec4(0.0)
+            if total[3] > 0.0:
+                kick = dt[world] * force_at(force, world, grid.origin + grid.dx * inside)
+                v = vec3(total[0], total[1], total[2]) / total[3] + kick
+                density = total[3] * grid.inv_volume
+                if ti.static(expands):
+                    density = fullness * grid.inv_volume
+                if wall:
+                    v = bounded(grid, inside, touching, v)
+                    density *= share_inside(grid, inside)
+                result = vec4(v[0], v[1], v[2], density)
+                for axis in ti.static(range(3)):
+                    if inside[axis] != node[axis]:
+                        result = seen_in_wall(result, axis, kind_near(grid, node, axis))
+                if hold < 1.0:  # between a wall that acts in full and none
+                    own = raw[t]
+                    free = vec4(0.0, 0.0, 0.0, result[3])
+                    if own[3] > 0.0:
+                        u = vec3(own[0], own[1], own[2]) / own[3] + kick
+                        free = vec4(u[0], u[1], u[2], result[3])
+                    result = hold * result + (1.0 - hold) * free
+            moving[t] = result
+
+    return SimpleNamespace(
+        reset_blocks=reset_blocks, find_blocks=find_blocks, clear_grid=clear_grid, p2g=p2g, grid_step=grid_step, g2p=g2p
+    )

@@ -1,0 +1,181 @@
+"""Taichi beside Warp on the same memory: start-up, types, and launches on Warp's arrays without copies.
+
+Kernels of Taichi read a NumPy header over the memory of a Warp array. On CUDA the header points to device memory, which
+Taichi recognises and uses in place; nobody reads such a header on the host.
+"""
+
+import contextlib
+import functools
+import io
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+import taichi as ti
+
+from fluidbench.device import note_launch
+from fluidbench.errors import UserError
+from fluidbench.scene import Force, Phase
+
+from .bind import rebound
+
+vec3, vec4, ivec3, mat3 = ti.math.vec3, ti.math.vec4, ti.math.ivec3, ti.math.mat3
+Floats = ti.types.ndarray(dtype=ti.f32, ndim=1)
+Ints = ti.types.ndarray(dtype=ti.i32, ndim=1)
+Vectors = ti.types.ndarray(dtype=vec3, ndim=1)
+Quads = ti.types.ndarray(dtype=vec4, ndim=1)
+Matrices = ti.types.ndarray(dtype=mat3, ndim=1)
+Phases = ti.types.ndarray(dtype=ti.f32, ndim=3)  # world, level of cure, parameter in the order of scene.Phase
+Forces = ti.types.ndarray(dtype=ti.f32, ndim=2)  # world, component: uniform, then gradient by rows
+SCALARS = {wp.float32: ti.f32, wp.int32: ti.i32, wp.vec3: vec3, wp.vec3i: ivec3, wp.mat33: mat3}
+TYPESTR = {wp.float32: "<f4", wp.int32: "<i4", wp.int64: "<i8"}
+_started: dict[str, tuple[str, int]] = {}
+
+
+def start(device: str, threads: int) -> None:
+    """Start Taichi for a device, once in a process; raises UserError when it runs with other settings already."""
+    wanted = ("cpu" if device == "cpu" else "cuda", threads)
+    running = _started.setdefault("taichi", wanted)
+    if running != wanted:
+        raise UserError(f"taichi runs on {running} in this process already and cannot be restarted for {wanted}")
+    if ti.lang.impl.get_runtime().prog is None:
+        with contextlib.redirect_stdout(io.StringIO()):
+            ti.init(
+                arch=getattr(ti, wanted[0]), cpu_max_num_threads=threads, default_fp=ti.f32, default_ip=ti.i32,
+                offline_cache=True, log_level=ti.ERROR,
+            )  # fmt: skip
+
+
+@functools.cache
+def taichi_func(law: Callable, *inner: Callable) -> Callable:
+    """A law as a Taichi function, see bind.py; `inner` are the laws that it calls, in order of their own needs."""
+    names: dict[str, object] = {
+        "sqrt": ti.sqrt, "exp": ti.exp, "pow": ti.pow, "min": ti.min, "max": ti.max, "abs": ti.abs,
+    }  # fmt: skip
+    for function in inner:
+        names[function.__name__] = taichi_func(function)
+    return ti.func(rebound(law, names))
+
+
+@functools.cache
+def struct_of(struct: Any) -> Any:
+    """A Warp structure's numbers and vectors as a Taichi type; its arrays become arguments of their own."""
+    return ti.types.struct(**{name: SCALARS[var.type] for name, var in struct.vars.items() if var.type in SCALARS})
+
+
+PhaseT, ForceT = struct_of(Phase), struct_of(Force)
+
+
+@ti.func
+def phase_at(phases: ti.template(), world, level):
+    """A row of the phase table."""
+    return PhaseT(
+        phases[world, level, 0], phases[world, level, 1], phases[world, level, 2], phases[world, level, 3],
+        phases[world, level, 4], phases[world, level, 5], phases[world, level, 6], phases[world, level, 7],
+        phases[world, level, 8], phases[world, level, 9], phases[world, level, 10], phases[world, level, 11],
+    )  # fmt: skip
+
+
+@ti.func
+def force_at(force: ti.template(), world, x):
+    """Force per unit mass [m/s^2] at a point."""
+    f = vec3(force[world, 0], force[world, 1], force[world, 2])
+    for a in ti.static(range(3)):
+        for b in ti.static(range(3)):
+            f[a] += force[world, 3 + 3 * a + b] * x[b]
+    return f
+
+
+@ti.func
+def is_solid(phase):
+    """Whether the material never flows."""
+    return phase.shear_modulus > 0.0 and phase.yield_stress >= phase.shear_modulus and phase.relaxation_rate == 0.0
+
+
+@ti.func
+def rest_density(mass: ti.template(), volume: ti.template(), i):
+    """Of a particle that may have grown [kg/m^3]."""
+    return mass[i] / volume[i]
+
+
+@ti.func
+def symmetric(b, s):
+    """The matrix with diagonal b and off-diagonal s: xy, xz, yz."""
+    return mat3(b[0], s[0], s[1], s[0], b[1], s[2], s[1], s[2], b[2])
+
+
+class _Header:
+    """What NumPy needs to know to describe memory that it does not own."""
+
+    def __init__(self, array: wp.array) -> None:
+        inner, dtype = (), array.dtype
+        if hasattr(dtype, "vars"):  # a structure: all of its members are float32
+            inner, dtype = (wp.types.type_size_in_bytes(dtype) // 4,), wp.float32
+        elif hasattr(dtype, "_shape_"):
+            inner, dtype = dtype._shape_, dtype._wp_scalar_type_
+        self.__array_interface__ = {
+            "data": (array.ptr, False), "shape": (*array.shape, *inner), "typestr": TYPESTR[dtype], "version": 3,
+        }  # fmt: skip
+
+
+class Taichi:
+    """Launches Taichi's kernels on Warp's arrays and structures."""
+
+    name = "taichi"
+
+    def __init__(self, device: wp.Device, threads: int) -> None:
+        self.device, self.threads = device, threads
+        self._known: dict[int, tuple[Any, list[Any]]] = {}
+        start("cpu" if device.is_cpu else "cuda", threads)
+
+    def launch(
+        self, kernel: Callable, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
+    ) -> None:
+        """Run a kernel, which finds its size in its arguments."""
+        note_launch()
+        kernel(*[part for argument in (*inputs, *outputs) for part in self._translated(argument)])
+
+    def prepare(self, solver: Any) -> None:
+        """Taichi compiles a kernel when it is called: one substep of an empty pool calls them all."""
+        count = solver.pool.count
+        active = count.numpy().copy()
+        count.zero_()
+        solver.refresh()
+        solver.substep()
+        self.wait()
+        count.assign(active)
+
+    def _translated(self, argument: Any) -> list[Any]:
+        """What a Warp argument is to Taichi; arrays and structures are kept, so they must not be replaced."""
+        if isinstance(argument, (int, float)):
+            return [argument]
+        if id(argument) not in self._known:
+            self._known[id(argument)] = (argument, _translate(argument))
+        return self._known[id(argument)][1]
+
+    def wait(self) -> None:
+        wp.synchronize_device(self.device)
+        ti.sync()
+
+
+def _translate(argument: Any) -> list[Any]:
+    if isinstance(argument, wp.array):
+        return [np.asarray(_Header(argument))]
+    struct = argument._cls
+    values = {name: getattr(argument, name) for name in struct.vars}
+    plain = {name: _plain(v) for name, v in values.items() if not isinstance(v, wp.array)}
+    arrays = [np.asarray(_Header(v)) for v in values.values() if isinstance(v, wp.array)]
+    return ([struct_of(struct)(**plain)] if plain else []) + arrays
+
+
+def _plain(value: Any) -> Any:
+    """A Warp vector or matrix as a Taichi one."""
+    if isinstance(value, wp.mat33):
+        return mat3(*[float(value[i, j]) for i in range(3) for j in range(3)])
+    if isinstance(value, wp.vec3i):
+        return ivec3(*[int(v) for v in value])
+    return vec3(*[float(v) for v in value]) if isinstance(value, wp.vec3) else value

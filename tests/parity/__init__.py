@@ -1,0 +1,1 @@
+"""Warp and Taichi against each other, pass by pass."""

@@ -1,0 +1,155 @@
+"""The same simulation in both languages, run pass by pass from one state."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import warp as wp
+
+from fluidbench.particles import CARRIED, CLAMPED, FREE
+from fluidbench.scenario import Scenario
+from fluidbench.simulation import Simulation
+from solvers.pbd.laws import conveyed_modulus
+
+TOLERANCE = 2e-5  # float32; sums may be taken in another order
+GARBAGE = 1.0e6  # in slots that nobody may touch
+
+
+class Difference(AssertionError):
+    """A pass whose results differ: says which, in what, and by how much."""
+
+
+def arrays_of(sim: Simulation) -> dict[str, wp.array]:
+    """Everything on the device that passes read or write, by name."""
+    found = {f"pool.{name}": array for name, array in sim.pool.fields.items()}
+    found |= {"pool.count": sim.pool.count, "pool.fault": sim.pool.fault}
+    found |= {name: getattr(sim.scene, name) for name in ("dt", "force", "phases")}
+    owners = {"": sim.solver, "neighbours.": getattr(sim.solver, "neighbours", None)}
+    network = getattr(sim.solver, "network", None)
+    if network is not None:
+        found |= {f"bonds.{name}": getattr(network.bonds, name) for name in ("number", "partner", "rest", "multiplier",
+                                                                            "state")}  # fmt: skip
+    for prefix, owner in owners.items():
+        for name, value in vars(owner).items() if owner is not None else ():
+            if isinstance(value, wp.array):
+                found[prefix + name] = value
+    return found
+
+
+class Twins:
+    """A scenario through one method, in Warp and in Taichi."""
+
+    def __init__(self, worlds: Scenario | list[Scenario], method: str, ticks: int) -> None:
+        self.warp, self.taichi = (Simulation(worlds, method, backend=b, graphs=False) for b in ("warp", "taichi"))
+        self.method = method
+        for sim in (self.warp, self.taichi):
+            sim.prepare()
+        for _ in range(ticks):
+            self.warp.advance()
+        self.taichi.pool.counts = list(self.warp.pool.counts)
+        self.ours, self.theirs = arrays_of(self.warp), arrays_of(self.taichi)
+        self.shared = [name for name in self.ours if name in self.theirs]
+        for name in ("raw", "moving", "fill"):  # scratch that begins as it was found
+            if name in self.ours:
+                self.ours[name].zero_()
+        self.least = self._least_scales()
+        self.equalise()
+
+    def _least_scales(self) -> dict[str, float]:
+        """Of what is made of numbers that cancel: PBD's multipliers of densities of order 1, its stress of elastic
+        tensors of order 1."""
+        sim = self.warp
+        if self.method != "pbd":
+            return {}
+        if not sim.scene.flowing:
+            return {"multiplier": 1.0}
+        modulus, density = (float(sim.scene.phases.numpy()[key].max()) for key in ("shear_modulus", "density"))
+        dt = float(sim.scene.dt.numpy()[0])
+        acts = conveyed_modulus(modulus, sim.config.shear_stiffness, density, sim.scene.spacing, dt)
+        return {"multiplier": 1.0, "stress": acts}
+
+    def equalise(self) -> None:
+        """Give Taichi's twin the state of Warp's."""
+        for name in self.shared:
+            wp.copy(self.theirs[name], self.ours[name])
+
+    def disturb(self, seed: int) -> None:
+        """A random state: places, velocities, stresses, phases and holds that no run would bring about."""
+        rng, pool = np.random.default_rng(seed), self.warp.pool
+        fields, spacing = pool.fields, self.warp.scene.spacing
+        active = np.zeros(pool.size, bool)
+        for world, count in enumerate(pool.counts):
+            active[world * pool.capacity : world * pool.capacity + count] = True
+        for name, array in fields.items():
+            values = array.numpy().copy()
+            if name == "position":
+                values += (rng.uniform(-0.2, 0.2, values.shape) * spacing).astype(np.float32)
+                low, high = np.asarray(self.warp.scene.box.lower), np.asarray(self.warp.scene.box.upper)
+                values = np.clip(values, low + 0.25 * spacing, high - 0.25 * spacing).astype(np.float32)
+            elif name == "velocity":
+                values += rng.normal(0.0, 0.1, values.shape).astype(np.float32)
+            elif name == "affine":
+                values += rng.normal(0.0, 5.0, values.shape).astype(np.float32)
+            elif name == "held":
+                values = rng.choice([FREE, FREE, FREE, CARRIED, CLAMPED], values.shape).astype(np.int32)
+            elif name == "phase":
+                values = rng.integers(0, self.warp.scene.levels, values.shape).astype(np.int32)
+            elif name in ("mass", "volume", "density", "volume_ratio"):
+                values *= rng.uniform(0.97, 1.03, values.shape).astype(np.float32)
+            elif name in ("elastic_normal", "elastic_shear"):
+                values += rng.normal(0.0, 0.02, values.shape).astype(np.float32)
+            if values.dtype.kind == "f":
+                values[~active] = GARBAGE
+            array.assign(values)
+        self.warp.solver.refresh()
+        self.equalise()
+
+    def check(self, passes: tuple[str, ...]) -> list[str]:
+        """Run passes one after the other, each from Warp's state; returns those that were run, raises Difference."""
+        done = []
+        for name in passes:
+            if self._applies(name):
+                for sim in (self.warp, self.taichi):
+                    getattr(sim.solver, name)()
+                    sim.solver.backend.wait()
+                for problem in self.differences():
+                    raise Difference(f"{self.method}.{name}: {problem}")
+                self.equalise()
+                done.append(name)
+        return done
+
+    def _applies(self, name: str) -> bool:
+        """Whether the scenario calls for this pass."""
+        solver, scene = self.warp.solver, self.warp.scene
+        if self.method == "pbd":
+            if name in ("bind", "stretch"):
+                return solver.network is not None
+            if name in ("strain", "pull"):
+                return scene.flowing
+            if name == "shear":
+                return scene.viscous
+        return True
+
+    def differences(self) -> Iterator[str]:
+        """One sentence for every array that is not the same."""
+        for name in self.shared:
+            a, b = self.ours[name].numpy(), self.theirs[name].numpy()
+            if name == "neighbours.entries":
+                yield from self._lists(a, b)
+            elif a.dtype.kind == "f":
+                unused = np.abs(a) == GARBAGE
+                if (a[unused] != b[unused]).any():
+                    yield f"{name} is touched in unused slots"
+                scale = max(float(np.abs(a[~unused]).max(initial=0.0)), self.least.get(name, 1e-30))
+                off = float(np.abs(a.astype(float) - b)[~unused].max(initial=0.0)) / scale
+                if not off <= TOLERANCE:
+                    yield f"{name} differs by {off:.2g} of its largest value"
+            elif a.dtype.kind in "iu" and (a != b).any():
+                yield f"{name} differs in {int((a != b).sum())} places"
+
+    def _lists(self, a: np.ndarray, b: np.ndarray) -> Iterator[str]:
+        """Neighbour lists are sets: what they hold counts, not in which order."""
+        limit, number = self.warp.solver.neighbours.limit, self.ours["neighbours.number"].numpy()
+        held = np.arange(limit) < number[:, None]
+        first, second = (np.sort(np.where(held, x.reshape(-1, limit), -1), axis=1) for x in (a, b))
+        if (first != second).any():
+            yield f"neighbours.entries differ for {int((first != second).any(axis=1).sum())} particles"
