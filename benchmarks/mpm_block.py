@@ -18,6 +18,7 @@ from fluidbench.device import quiet_warp
 from fluidbench.material import Material
 from fluidbench.scenario import Domain, Scenario
 from fluidbench.simulation import Simulation
+from fluidbench.target import Target
 
 SPACING, CELLS, DT, SUBSTEPS = 7e-3, 64, 1e-4, 10
 
@@ -38,7 +39,7 @@ def block(particles: int) -> Scenario:
 
 def measure(particles: int, device: str, steps: int, warmup: int) -> dict[str, object]:
     """Steps a second, and particle-substeps per wall and CPU second, of the replayed graph alone."""
-    simulation = Simulation(block(particles), "mpm", device)
+    simulation = Simulation(block(particles), "mpm", Target(device))
     simulation.prepare()
     simulation.solver.refresh()
     simulation.scene.set_dt(DT)

@@ -11,6 +11,7 @@ from fluidbench.device import quiet_warp
 from fluidbench.material import Material
 from fluidbench.scenario import Domain, Scenario, Walls
 from fluidbench.simulation import Simulation
+from fluidbench.target import Target
 
 
 def dam(particles: int, simulated: float, depth: float) -> Scenario:
@@ -36,7 +37,7 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     a = parser.parse_args()
     quiet_warp()
-    outcome = Simulation(dam(a.particles, a.simulated, a.depth), "sph", a.device).run()
+    outcome = Simulation(dam(a.particles, a.simulated, a.depth), "sph", Target(a.device)).run()
     print(json.dumps({
         "benchmark": "sph_dam", "device": a.device, "particles": outcome.peak_particles, "verdict": outcome.verdict,
         "substeps": outcome.substeps, "simulated_s": outcome.time,

@@ -14,12 +14,14 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from . import __version__
 from .scenario import Scenario
 from .store import RECORD, write_atomically
+from .target import BACKENDS, HERE, Target
 
 PROGRESS = "@progress "
 GRACE = 120.0  # seconds beyond the wall limit for compiling, measuring and writing
@@ -31,8 +33,7 @@ class Job:
 
     scenario: dict[str, Any]
     method: str
-    device: str = "cpu"
-    backend: str = "warp"
+    target: Target = HERE
     repeat: int = 0
     wall_limit: float | None = None
     keep_frames: bool = False
@@ -86,7 +87,7 @@ def _post_mortem(job: Job, folder: Path, code: int, timed: bool) -> dict[str, An
     last = lines[-1] if lines else "no message"
     reason = f"the run's process ended with code {code}: {last}"
     record = {
-        "scenario": job.scenario["name"], "method": job.method, "device": job.device, "backend": job.backend,
+        "scenario": job.scenario["name"], "method": job.method, **asdict(job.target),
         "repeat": job.repeat, "verdict": "timeout" if timed and code < 0 else "error", "reason": reason,
     }  # fmt: skip
     write_atomically(folder / RECORD, json.dumps(record, indent=1))
@@ -109,7 +110,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     scenario = Scenario.model_validate(job.scenario)
     solver = get_solver(job.method)
     start = time.perf_counter()
-    simulation = Simulation(scenario, solver, job.device, job.backend)
+    simulation = Simulation(scenario, solver, job.target)
     rows: list[dict[str, float]] = []
 
     def observe(sim: Simulation, vital: Any) -> None:
@@ -135,7 +136,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     complete = outcome.verdict is Verdict.COMPLETED
     final = {**ledger(frame, scenario), **final_lengths(frame, scenario)} if complete else {}
     record = {
-        "scenario": scenario.name, "method": job.method, "device": job.device, "backend": job.backend,
+        "scenario": scenario.name, "method": job.method, **asdict(job.target),
         "repeat": job.repeat, "seed": scenario.seed, "spacing_m": scenario.spacing,
         "verdict": str(outcome.verdict), "reason": outcome.reason,
         "measures": final,
@@ -152,7 +153,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         "approximations": approximations(solver, scenario, simulation.config),
         "warnings": scenario.warnings(),
         "config": simulation.config.model_dump(), "input": scenario.model_dump(mode="json"),
-        "machine": machine(job.device),
+        "machine": machine(job.target),
     }  # fmt: skip
     write_atomically(folder / RECORD, json.dumps(record, indent=1))
     return record
@@ -197,15 +198,18 @@ def cost(outcome: Any, simulation: Any, total: float) -> dict[str, float]:
     return row
 
 
-def machine(device: str) -> dict[str, str]:
+def machine(target: Target) -> dict[str, str]:
     """What it ran on."""
     import numpy as np
     import warp as wp
 
+    device = wp.get_device(target.device)
+    arch = platform.machine() if device.is_cpu else f"sm_{device.arch}"
     return {
         "fluidbench": __version__, "python": platform.python_version(), "warp": str(wp.config.version),
+        "backend_version": version(BACKENDS[target.backend]), "arch": arch,
         "numpy": np.__version__, "platform": platform.platform(), "cores": str(os.cpu_count()),
-        "device": wp.get_device(device).name or platform.processor(), "time": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "device": device.name or platform.processor(), "time": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
     }  # fmt: skip
 
 
@@ -222,7 +226,8 @@ def _end_with_parent() -> None:
 def main(folder: Path) -> None:
     """The child's entry point."""
     _end_with_parent()
-    job = Job(**json.loads((folder / "job.json").read_text()))
+    table = json.loads((folder / "job.json").read_text())
+    job = Job(**table | {"target": Target(**table["target"])})
 
     def report(state: dict[str, Any]) -> None:
         print(PROGRESS + json.dumps(state), flush=True)

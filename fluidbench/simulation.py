@@ -11,7 +11,7 @@ import warp as wp
 
 from . import health
 from .device import CountedLaunches
-from .errors import UserError, suggestion
+from .errors import UserError
 from .health import Health, Vital
 from .layout import capacity_of, emitted, generations
 from .particles import OutOfCapacity, Pool
@@ -23,7 +23,8 @@ from .process.expansion import Growing
 from .process.laying import Laying
 from .scenario import Scenario
 from .scene import Scene
-from .solver import Demands, Solver, configure, get_solver, refusal
+from .solver import Demands, Solver, check_backend, configure, get_solver, refusal
+from .target import DEFAULT_BACKEND, HERE, Target
 from .timestep import Bound, Plan, plan
 
 SORT_TICKS = 32  # ticks between reorderings of the pool, at most
@@ -63,16 +64,13 @@ class Simulation:
     """One method on one scenario, or on several worlds of it."""
 
     def __init__(
-        self, scenarios: Scenario | Sequence[Scenario], method: str | type[Solver], device: str = "cpu",
-        backend: str = "warp", threads: int = 1, config: Any = None, graphs: bool = True,
+        self, scenarios: Scenario | Sequence[Scenario], method: str | type[Solver], target: Target = HERE,
+        config: Any = None, graphs: bool = True,
     ) -> None:  # fmt: skip
         solver_class = get_solver(method) if isinstance(method, str) else method
-        if backend not in solver_class.backends:
-            raise UserError(
-                f"{solver_class.name} has no backend '{backend}'{suggestion(backend, solver_class.backends)}; it has "
-                f"{' and '.join(solver_class.backends)}"
-            )
-        self.scene = Scene(scenarios, device)
+        check_backend(solver_class, target)
+        self.target = target
+        self.scene = Scene(scenarios, target.device)
         self.scenario = self.scene.scenario
         self.config = configure(solver_class, self.scenario) if config is None else config
         for scenario in self.scene.scenarios:
@@ -85,7 +83,7 @@ class Simulation:
         growing = material.expansion is not None
         family = (emitted(self.scenario), generations(self.scenario)) if growing else ()
         self.growing = Growing(self.scene, self.pool, *family) if growing else None
-        self.solver = solver_class(self.scene, self.pool, self.config, backend, threads)
+        self.solver = solver_class(self.scene, self.pool, self.config, target.backend, target.threads)
         self.curing = Curing(self.scene, self.pool, self.solver.harden) if material.cure is not None else None
         self.contact = Contact(self.scene, self.pool) if self.scenario.collider is not None else None
         self.health = Health(self.scene, self.pool)
@@ -98,7 +96,7 @@ class Simulation:
         self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
         self._graphs: dict[int, Any] = {}
         self.substep_launches, self.process_launches = CountedLaunches(), CountedLaunches()
-        self._use_graphs = graphs and backend == "warp"
+        self._use_graphs = graphs and target.backend == DEFAULT_BACKEND
 
     @property
     def now(self) -> float:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .particles import Pool
     from .scenario import Scenario
     from .scene import Scene
+    from .target import Target
     from .timestep import Bound
 
 LOST = 0.1  # share of a scenario's own speed that single precision may lose
@@ -138,6 +139,15 @@ def get_solver(name: str) -> type[Solver]:
     for point in entry_points(group=ENTRY_POINTS, name=name):
         return point.load()
     raise UserError(f"no solver named '{name}'{suggestion(name, solver_names())}")
+
+
+def check_backend(solver: type[Solver], target: Target) -> None:
+    """Raise UserError unless the method has the target's backend."""
+    if target.backend not in solver.backends:
+        raise UserError(
+            f"{solver.name} has no backend '{target.backend}'{suggestion(target.backend, solver.backends)}; it has "
+            f"{' and '.join(solver.backends)}"
+        )
 
 
 class Demands:

@@ -130,14 +130,30 @@ class Taichi:
     def __init__(self, device: wp.Device, threads: int) -> None:
         self.device, self.threads = device, threads
         self._known: dict[int, tuple[Any, list[Any]]] = {}
+        self._compiled: set[tuple[Any, ...]] = set()
+        self._replays: dict[tuple[Any, ...], Callable[[], None]] = {}
         start("cpu" if device.is_cpu else "cuda", threads)
 
     def launch(
         self, kernel: Callable, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
     ) -> None:
-        """Run a kernel, which finds its size in its arguments."""
+        """Run a kernel, which finds its size in its arguments.
+
+        Handing some twenty arguments over from Python takes longer than most kernels do, and they are always the same:
+        the first call compiles, the second is recorded, later ones are replayed.
+        """
         note_launch()
-        kernel(*[part for argument in (*inputs, *outputs) for part in self._translated(argument)])
+        arguments = (*inputs, *outputs)
+        call = (kernel, *(a if isinstance(a, (int, float)) else id(a) for a in arguments))
+        if call in self._replays:
+            self._replays[call]()
+            return
+        parts = [part for argument in arguments for part in self._translated(argument)]
+        if call in self._compiled:
+            self._replays[call] = _recorded(kernel, parts)
+        else:
+            self._compiled.add(call)
+            kernel(*parts)
 
     def prepare(self, solver: Any) -> None:
         """Taichi compiles a kernel when it is called: one substep of an empty pool calls them all."""
@@ -160,6 +176,33 @@ class Taichi:
     def wait(self) -> None:
         wp.synchronize_device(self.device)
         ti.sync()
+
+
+class _Eavesdropper:
+    """Stands in for Taichi's program during one call, to learn what is launched and with what."""
+
+    def __init__(self, program: Any) -> None:
+        self.program = program
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.program, name)
+
+    def launch_kernel(self, compiled: Any, context: Any) -> None:
+        self.heard = (compiled, context)
+        self.program.launch_kernel(compiled, context)
+
+
+def _recorded(kernel: Callable, parts: list[Any]) -> Callable[[], None]:
+    """Call a compiled kernel and return what calls it again with the same arguments."""
+    runtime = ti.lang.impl.get_runtime()
+    program = runtime.prog
+    runtime.prog = _Eavesdropper(program)
+    try:
+        kernel(*parts)
+        compiled, context = runtime.prog.heard
+    finally:
+        runtime.prog = program
+    return lambda: program.launch_kernel(compiled, context)
 
 
 def _translate(argument: Any) -> list[Any]:

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import UserError
+from ..errors import UserError, suggestion
 
 if TYPE_CHECKING:
     from ..scenario import Scenario
+    from ..target import Target
 
 app = typer.Typer(
     name="fluidbench", no_args_is_help=True, add_completion=False, rich_markup_mode=None,
@@ -19,6 +20,8 @@ ScenarioName = Annotated[str, typer.Argument(help="a shipped scenario (see `flui
 Settings = Annotated[list[str] | None, typer.Option("--set", help="override a key, e.g. material.yield_stress=50")]
 Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], instead of the scenario's")]
 Device = Annotated[str, typer.Option(help="cpu, or cuda:0, cuda:1, ...")]
+Backend = Annotated[str, typer.Option(help="language of the kernels: warp or taichi")]
+Threads = Annotated[int, typer.Option(min=1, help="CPU threads of a backend that can use several (taichi)")]
 Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/SCENARIO")]
 WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
 Film = Annotated[float | None, typer.Option("--render-every", min=1e-6, help="simulated seconds between pictures, "
@@ -37,8 +40,21 @@ def split(text: str) -> list[str]:
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
-def check_device(device: str) -> None:
-    """Raise UserError unless the device exists."""
+def target_of(device: str, backend: str, threads: int) -> "Target":
+    """Where to run; raises UserError unless the device exists and the backend is installed."""
+    from importlib.util import find_spec
+
+    from ..target import BACKENDS, Target
+
+    if backend not in BACKENDS:
+        raise UserError(f"no backend '{backend}'{suggestion(backend, list(BACKENDS))}; there are {', '.join(BACKENDS)}")
+    if find_spec(backend) is None:
+        raise UserError(f"the backend {backend} is not installed: pip install {BACKENDS[backend]}")
+    _check_device(device)
+    return Target(device, backend, threads if backend != "warp" and device == "cpu" else 1)
+
+
+def _check_device(device: str) -> None:
     if device == "cpu":
         return
     import warp as wp

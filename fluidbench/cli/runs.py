@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .app import (
+    Backend,
     Device,
     Film,
     Frames,
@@ -14,11 +15,12 @@ from .app import (
     ScenarioName,
     Settings,
     Spacing,
+    Threads,
     WallLimit,
     app,
-    check_device,
     load_scenario,
     split,
+    target_of,
 )
 
 if TYPE_CHECKING:
@@ -35,6 +37,8 @@ def compare(
     spacing: Spacing = None,
     repeats: Annotated[int, typer.Option(min=1, help="runs of each method, for the spread of the cost")] = 1,
     device: Device = "cpu",
+    backend: Annotated[str, typer.Option(help="languages of the kernels, separated by commas: warp, taichi")] = "warp",
+    threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 900.0,
     frames: Frames = False,
@@ -45,7 +49,19 @@ def compare(
 
     A second call with the same inputs reuses the runs that are finished.
     """
-    _study(scenario, solvers, set_, spacing, repeats, device, out, wall_limit, frames, quick, render_every)
+    _study(
+        scenario,
+        solvers,
+        set_,
+        spacing,
+        repeats,
+        (device, backend, threads),
+        out,
+        wall_limit,
+        frames,
+        quick,
+        render_every,
+    )
 
 
 @app.command()
@@ -55,6 +71,8 @@ def run(
     set_: Settings = None,
     spacing: Spacing = None,
     device: Device = "cpu",
+    backend: Backend = "warp",
+    threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 900.0,
     frames: Frames = False,
@@ -62,7 +80,7 @@ def run(
     render_every: Film = None,
 ) -> None:
     """Run one scenario through one method."""
-    _study(scenario, solver, set_, spacing, 1, device, out, wall_limit, frames, quick, render_every)
+    _study(scenario, solver, set_, spacing, 1, (device, backend, threads), out, wall_limit, frames, quick, render_every)
 
 
 @app.command()
@@ -72,6 +90,8 @@ def validate(
     levels: Annotated[str, typer.Option(help="spacings: rough, coarse, medium, fine (1.5, 1, 2/3, 1/2)")] = "coarse",
     quick: Annotated[bool, typer.Option("--quick", help="a few minutes: the cheap cases, every physics")] = False,
     device: Device = "cpu",
+    backend: Backend = "warp",
+    threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 1800.0,
     jobs: Annotated[int | None, typer.Option(min=1, help="runs at a time; default 2, or 1 on CUDA")] = None,
@@ -89,8 +109,8 @@ def validate(
     from ..study.validate import plan
 
     methods = split(solvers) or solver_names()
-    check_device(device)
-    trials = plan(select(cases or []), methods, split(levels), quick, device, wall_limit)
+    target = target_of(device, backend, threads)
+    trials = plan(select(cases or []), methods, split(levels), quick, target, wall_limit)
     store = Store((out or Path("fluidbench-out") / "validate").resolve())
     _validate(trials, store, jobs or (2 if device == "cpu" else 1), Console(stderr=True))
     if not present(trials, store.root, Console(width=None if sys.stdout.isatty() else 120)):
@@ -128,8 +148,8 @@ def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None
 
 
 def _study(
-    name: str, solvers: str, settings: list[str] | None, spacing: float | None, repeats: int, device: str,
-    out: Path | None, wall_limit: float, frames: bool, quick: bool,
+    name: str, solvers: str, settings: list[str] | None, spacing: float | None, repeats: int,
+    where: tuple[str, str, int], out: Path | None, wall_limit: float, frames: bool, quick: bool,
     film_every: float | None,
 ) -> None:  # fmt: skip
     """compare and run: everything is checked before anything is written."""
@@ -141,8 +161,9 @@ def _study(
 
     scenario = load_scenario(name, settings, spacing, quick)
     methods = split(solvers) or solver_names()
-    planned = jobs(scenario, methods, repeats, device, "warp", wall_limit, frames, film_every)
-    check_device(device)
+    device, backends, threads = where
+    targets = [target_of(device, backend, threads) for backend in split(backends)]
+    planned = jobs(scenario, methods, repeats, targets, wall_limit, frames, film_every)
     console, errors = Console(), Console(stderr=True)
     for warning in scenario.warnings():
         errors.print(f"warning: {warning}", markup=False, highlight=False)
@@ -165,7 +186,7 @@ def _run_all(planned: list[Any], store: Any, console: Any) -> list["Finished"]:
 
         def started(i: int, job: Any, reused: bool) -> None:
             state = "finished earlier" if reused else "compiling"
-            tasks[i] = progress.add_task(f"{job.method:<5} {job.repeat + 1}", total=1.0, state=state)
+            tasks[i] = progress.add_task(f"{job.method:<5}{job.target.suffix} {job.repeat + 1}", total=1.0, state=state)
 
         def step(i: int, state: dict[str, Any]) -> None:
             text = f"t = {state['time']:.3f} of {state['until']:g} s, top speed {state['speed']:.3g} m/s"

@@ -7,23 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .app import (
+    Backend,
     Device,
     Out,
     ScenarioName,
     Settings,
     Spacing,
+    Threads,
     WallLimit,
     app,
     budget_of,
-    check_device,
     count_of,
     fraction,
     load_scenario,
     split,
+    target_of,
 )
 
 if TYPE_CHECKING:
     from ..store import Store
+    from ..target import Target
 
 Solvers = Annotated[str, typer.Option(help="methods, separated by commas; default all that are installed")]
 Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
@@ -41,6 +44,8 @@ def stability(
     spacing: Spacing = None,
     quick: Quick = False,
     device: Device = "cpu",
+    backend: Backend = "warp",
+    threads: Threads = 1,
     out: Out = None,
     jobs: Jobs = None,
 ) -> None:  # fmt: skip
@@ -54,41 +59,41 @@ def stability(
     from ..study.stability import block_tasks, choose, measure_block, measure_point, point_tasks
 
     resolved, axes = load_scenario(scenario, set_, spacing), choose(split(axis))
-    methods, store, workers = _prepare(solvers, device, out, "stability", jobs)
-    blocks = block_tasks(methods, quick, device)
-    points = point_tasks(resolved, axes, methods, quick, device)
-    stiffness = select(["pbd_stiffness"]) if "pbd" in methods and device == "cpu" else []
+    target = target_of(device, backend, threads)
+    methods, store, workers = _prepare(solvers, target, out, "stability", jobs)
+    blocks = block_tasks(methods, quick, target)
+    points = point_tasks(resolved, axes, methods, quick, target)
+    stiffness = select(["pbd_stiffness"]) if "pbd" in methods and target.device == "cpu" else []
     with _watch("stability", len(blocks) + len(points)) as tell:
         measured = run_tasks(blocks, measure_block, store, workers, lambda i, _: tell(blocks[i][0]))
         rows = run_tasks(points, measure_point, store, workers, lambda i, r: tell(f"{points[i][0]} {r.get('verdict')}"))
-    trials = _judged(stiffness, ["pbd"], device, store, workers)
+    trials = _judged(stiffness, ["pbd"], target, store, workers)
     _publish(report(resolved, rows, measured, trials), store.root)
     if any(row.get("verdict") not in ("held", "refused") for row in rows):
         raise typer.Exit(1)
 
 
 def _prepare(
-    solvers: str, device: str, out: Path | None, verb: str, jobs: int | None
+    solvers: str, target: "Target", out: Path | None, verb: str, jobs: int | None
 ) -> "tuple[list[str], Store, int]":
     """Methods, output folder and number of workers; everything is checked before anything is written."""
     from ..device import quiet_warp
-    from ..solver import get_solver, solver_names
+    from ..solver import check_backend, get_solver, solver_names
     from ..store import Store
 
     quiet_warp()
-
     methods = split(solvers) or solver_names()
     for method in methods:
-        get_solver(method)
-    check_device(device)
-    return methods, Store((out or Path("fluidbench-out") / verb).resolve()), jobs or (2 if device == "cpu" else 1)
+        check_backend(get_solver(method), target)
+    store = Store((out or Path("fluidbench-out") / verb).resolve())
+    return methods, store, jobs or (2 if target.device == "cpu" else 1)
 
 
-def _judged(cases: list[Any], methods: list[str], device: str, store: "Store", workers: int) -> list[Any]:
+def _judged(cases: list[Any], methods: list[str], target: "Target", store: "Store", workers: int) -> list[Any]:
     """Cases with known answers, run and judged without a display."""
     from ..study.validate import plan, run
 
-    trials = plan(cases, methods, ["coarse"], False, device, 1800.0)
+    trials = plan(cases, methods, ["coarse"], False, target, 1800.0)
     run(trials, store, workers, *[lambda *_: None] * 4)
     return trials
 
@@ -131,6 +136,8 @@ def ablate(
     set_: Settings = None,
     spacing: Spacing = None,
     device: Device = "cpu",
+    backend: Backend = "warp",
+    threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 900.0,
     jobs: Jobs = None,
@@ -145,11 +152,12 @@ def ablate(
     from ..study.execute import Hooks
 
     resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
-    methods, store, workers = _prepare(solvers, device, out, "ablate", jobs)
+    target = target_of(device, backend, threads)
+    methods, store, workers = _prepare(solvers, target, out, "ablate", jobs)
     total = len(methods) + sum(len(methods) if c.method is None else 1 for c in changes(resolved, methods))
     with _watch("ablate", total) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        done = study(resolved, methods, share, store, hooks, workers, device, wall_limit)
+        done = study(resolved, methods, share, store, hooks, workers, target, wall_limit)
     given = [*(set_ or []), *([f"spacing={spacing!r}"] if spacing is not None else [])]
     _publish(report(resolved, scenario, given, done, share, store.root), store.root)
 
@@ -163,6 +171,8 @@ def select(
     set_: Settings = None,
     spacing: Spacing = None,
     device: Device = "cpu",
+    backend: Backend = "warp",
+    threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 900.0,
 ) -> None:
@@ -177,10 +187,11 @@ def select(
 
     resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
     seconds, pace = budget_of(budget)
-    methods, store, _ = _prepare(solvers, device, out, f"select-{resolved.name}", 1)
+    target = target_of(device, backend, threads)
+    methods, store, _ = _prepare(solvers, target, out, f"select-{resolved.name}", 1)
     with _watch("select", len(methods) * len(FACTORS)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        chosen = study(resolved, methods, store, hooks, device, wall_limit)
+        chosen = study(resolved, methods, store, hooks, target, wall_limit)
     _publish(report(resolved, scenario, chosen, share, seconds, pace, store.root), store.root)
     if not chosen.candidates:
         raise typer.Exit(1)
@@ -194,6 +205,8 @@ def table1(
     spacing: Spacing = None,
     quick: Quick = False,
     device: Device = "cpu",
+    backend: Backend = "warp",
+    threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 1800.0,
     jobs: Jobs = None,
@@ -210,10 +223,11 @@ def table1(
     coarser = 4 / 3 if quick and spacing is None else 1.0
     resolved = load_scenario(scenario, set_, spacing)
     resolved = load_scenario(scenario, set_, coarser * resolved.spacing)
-    methods, store, workers = _prepare(",".join(METHODS), device, out, "table1", jobs)
+    target = target_of(device, backend, threads)
+    methods, store, workers = _prepare(",".join(METHODS), target, out, "table1", jobs)
     trials = [
         trial for case in chosen_cases(quick)
-        for trial in plan([case], methods, levels_of(case, quick), False, device, wall_limit)
+        for trial in plan([case], methods, levels_of(case, quick), False, target, wall_limit)
     ]  # fmt: skip
     with _watch("known answers", len(trials)) as tell:
         none = lambda *_: None  # noqa: E731
@@ -221,7 +235,7 @@ def table1(
     trials += shipped() if quick else []
     with _watch("the scenario", planned(repeats)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, device, wall_limit)
+        evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, target, wall_limit)
     _publish(report(evidence, store.root), store.root)
 
 
@@ -232,6 +246,8 @@ def table2(
     repeats: Annotated[int, typer.Option(min=1, help="runs of each row, without and with pictures")] = 5,
     quick: Quick = False,
     device: Device = "cpu",
+    backend: Backend = "warp",
+    threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 1800.0,
 ) -> None:
@@ -244,9 +260,10 @@ def table2(
     from ..study.table2 import VARIANTS
     from ..study.table2 import table2 as study
 
-    methods, store, _ = _prepare(solvers, device, out, "table2", 1)
+    target = target_of(device, backend, threads)
+    methods, store, _ = _prepare(solvers, target, out, "table2", 1)
     sizes = [None if part == "fit" else count_of(part, "--pools") for part in split(pools)]
     with _watch("table2", 2 * repeats * len(VARIANTS) * len(methods) * len(sizes)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        rows = study(methods, sizes, repeats, quick, store, hooks, device, wall_limit)
+        rows = study(methods, sizes, repeats, quick, store, hooks, target, wall_limit)
     _publish(report(rows, store.root), store.root)

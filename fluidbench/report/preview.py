@@ -64,6 +64,7 @@ def diagnosis() -> list[str]:
     for package in (
         "fluidbench",
         "warp-lang",
+        "taichi",
         "numpy",
         "scipy",
         "pandas",

@@ -16,12 +16,14 @@ from ..scenario import Scenario
 from ..study.execute import Finished
 
 COLOURS = {"mpm": "#0072B2", "sph": "#D55E00", "pbd": "#009E73"}  # Okabe & Ito: distinct for colour-blind readers
+LIGHTER = {"mpm": "#7FC1EC", "sph": "#F3A873", "pbd": "#84D7BC"}  # the same methods through another backend
 OTHERS = ("#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 
 def colour(label: str) -> str:
-    """A method's colour, the same in every plot."""
-    return COLOURS.get(label, OTHERS[sum(map(ord, label)) % len(OTHERS)])
+    """A method's colour, the same in every plot; lighter for "mpm (taichi)" and its like."""
+    method, _, backend = label.partition(" ")
+    return (LIGHTER if backend else COLOURS).get(method, OTHERS[sum(map(ord, label)) % len(OTHERS)])
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from ..run import Job
 from ..scenario import Friction, Scenario
 from ..solver import configure, get_solver
 from ..store import Store
+from ..target import Target
 from .compare import lengths_of
 from .execute import Finished, Hooks, execute
 from .stability import varied
@@ -128,13 +129,13 @@ def _numerical(method: str, config: Any, scenario: Scenario) -> list[tuple[str, 
 
 def ablate(
     scenario: Scenario, methods: Sequence[str], tolerance: float, store: Store, hooks: Hooks, workers: int,
-    device: str, wall_limit: float,
+    target: Target, wall_limit: float,
 ) -> Ablation:  # fmt: skip
     """Run everything; the leanest mixes last."""
 
     def job(settings: dict[str, Any], method: str) -> Job:
         changed = varied(scenario.model_dump(mode="json"), settings)
-        return Job(changed.model_dump(mode="json"), method, device, wall_limit=wall_limit)
+        return Job(changed.model_dump(mode="json"), method, target, wall_limit=wall_limit)
 
     wanted = [(c, m) for c in changes(scenario, methods) for m in methods if c.method in (None, m)]
     planned, impossible = [], []

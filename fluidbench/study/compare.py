@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..run import Job
 from ..scenario import Scenario
-from ..solver import configure, get_solver
+from ..solver import check_backend, configure, get_solver
 from ..store import write_atomically
+from ..target import Target
 from .execute import Finished
 
 if TYPE_CHECKING:
@@ -18,16 +19,19 @@ if TYPE_CHECKING:
 
 
 def jobs(
-    scenario: Scenario, methods: Sequence[str], repeats: int, device: str, backend: str, wall_limit: float | None,
+    scenario: Scenario, methods: Sequence[str], repeats: int, targets: Sequence[Target], wall_limit: float | None,
     keep_frames: bool, film_every: float | None = None,
 ) -> list[Job]:  # fmt: skip
     """All runs of a comparison; raises UserError for an unknown method or setting before anything has run."""
     for name in methods:
         configure(get_solver(name), scenario)
+        for target in targets:
+            check_backend(get_solver(name), target)
     table = scenario.model_dump(mode="json")
     return [
-        Job(table, name, device, backend, repeat, wall_limit, keep_frames, film_every)
+        Job(table, name, target, repeat, wall_limit, keep_frames, film_every)
         for name in methods
+        for target in targets
         for repeat in range(repeats)
     ]
 
@@ -39,7 +43,10 @@ def tidy(results: Sequence[Finished]) -> pd.DataFrame:
     rows = []
     for result in results:
         record = result.record
-        row = {k: record.get(k) for k in ("scenario", "method", "device", "backend", "repeat", "seed", "spacing_m")}
+        row = {
+            k: record.get(k)
+            for k in ("scenario", "method", "device", "backend", "threads", "repeat", "seed", "spacing_m")
+        }
         row |= {"verdict": record["verdict"], "reason": record.get("reason", "")}
         row |= record.get("measures", {})
         row |= {f"error: {a['quantity']}": a["error"] for a in record.get("answers", [])}

@@ -11,6 +11,7 @@ from ..run import Job
 from ..scenario import Scenario
 from ..solver import configure, get_solver
 from ..store import Store
+from ..target import Target
 from .case import Case, Finding, cases
 from .execute import Finished, Hooks, execute
 from .experiments import run_tasks
@@ -70,14 +71,14 @@ def shipped() -> list[Trial]:
 
 def gather(
     scenario: Scenario, trials: list[Trial], repeats: int, quick: bool, store: Store, hooks: Hooks, workers: int,
-    device: str, wall_limit: float,
+    target: Target, wall_limit: float,
 ) -> Evidence:  # fmt: skip
     """The runs on the scenario itself, one at a time so that times mean something; known answers come finished."""
     table = scenario.model_dump(mode="json")
 
     def runs(method: str, settings: Sequence[dict[str, Any]], repeat: Sequence[int] = (0,)) -> list[Finished]:
         jobs = [
-            Job(varied(table, s).model_dump(mode="json"), method, device, repeat=r, wall_limit=wall_limit)
+            Job(varied(table, s).model_dump(mode="json"), method, target, repeat=r, wall_limit=wall_limit)
             for s in settings for r in repeat
         ]  # fmt: skip
         return execute(jobs, store, hooks)
@@ -91,7 +92,7 @@ def gather(
     found.grids = sweep("mpm", GRID_RATIOS, lambda g, f: {"numerics.mpm.grid_ratio": g, "spacing": f * cell / g})
     found.iterations = sweep("pbd", ITERATIONS, lambda n, f: _pbd("iterations", n, f * scenario.spacing))
     found.advances = sweep("pbd", ADVANCES, lambda a, f: _pbd("advance", a, f * scenario.spacing))
-    tasks = point_tasks(scenario, {"spacing": LIMITS}, METHODS, quick, device)
+    tasks = point_tasks(scenario, {"spacing": LIMITS}, METHODS, quick, target)
     rows = run_tasks(tasks, measure_point, store, workers, lambda *_: None)
     found.limits = {m: [r for r in rows if r.get("method") == m] for m in METHODS}
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from ..run import Job, launch
 from ..scenario import Scenario
 from ..solver import configure, get_solver, refusal
 from ..store import Store, write_atomically
+from ..target import Target
 
 ADVICE = {
     "diverged": "its results are left out of every comparison",
@@ -36,7 +37,8 @@ class Finished:
 
     @property
     def label(self) -> str:
-        return str(self.record["method"])
+        target = Target(self.record["device"], self.record["backend"])
+        return f"{self.record['method']}{target.suffix}"
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def _refused(job: Job, folder: Path) -> dict[str, Any] | None:
     if reason is None:
         return None
     record = {
-        "scenario": scenario.name, "method": job.method, "device": job.device, "backend": job.backend,
+        "scenario": scenario.name, "method": job.method, **asdict(job.target),
         "repeat": job.repeat, "verdict": "refused", "reason": reason,
     }  # fmt: skip
     write_atomically(folder / "record.json", json.dumps(record, indent=1))

@@ -18,6 +18,7 @@ from ..body import Body
 from ..scenario import Scenario
 from ..simulation import SPEED_MARGIN, Simulation
 from ..solver import Solver
+from ..target import Target
 
 GROWTH, STEPS, LOOKS = (
     100.0,
@@ -80,12 +81,12 @@ def block(material: dict[str, Any], spacing: float) -> Scenario:
 
 
 def block_limit(
-    scenario: Scenario, method: type[Solver], config: Any, guess: float, precision: float, device: str
+    scenario: Scenario, method: type[Solver], config: Any, guess: float, precision: float, target: Target
 ) -> Limit:
     """The largest stable dt of a block, with tension allowed: theory knows no cavitation."""
 
     def survives(dt: float) -> bool:
-        sim = Simulation(scenario, method, device, config=config)
+        sim = Simulation(scenario, method, target, config=config)
         sim.scene.allow_tension()
         rng = np.random.default_rng(0)
         kick = AMPLITUDE * scenario.wave_speed * rng.uniform(-1, 1, (sim.pool.size, 3))
@@ -128,10 +129,10 @@ def _box(center: tuple[float, float, float], edge: float, speed: float) -> Body:
     )
 
 
-def lump_survives(scenario: Scenario, method: type[Solver], config: Any, dt: float, device: str) -> str | None:
+def lump_survives(scenario: Scenario, method: type[Solver], config: Any, dt: float, target: Target) -> str | None:
     """None if the lump comes through at this dt [s], otherwise what went wrong."""
     thrown = Scenario.model_validate(lump(scenario, dt).model_dump())
-    sim = Simulation(thrown, method, device, config=config)
+    sim = Simulation(thrown, method, target, config=config)
     for _ in range(LUMP_STEPS // LOOKS):
         sim.march(dt, LOOKS)
         vital = sim.look()

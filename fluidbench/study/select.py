@@ -25,6 +25,7 @@ from ..measure.reference import table as reference
 from ..run import Job
 from ..scenario import Scenario
 from ..store import Store
+from ..target import Target
 from .compare import lengths_of
 from .execute import Finished, Hooks, execute
 
@@ -119,7 +120,7 @@ def trust_of(scenario: Scenario, methods: Sequence[str]) -> dict[str, Trust]:
 
 
 def select(
-    scenario: Scenario, methods: Sequence[str], store: Store, hooks: Hooks, device: str, wall_limit: float
+    scenario: Scenario, methods: Sequence[str], store: Store, hooks: Hooks, target: Target, wall_limit: float
 ) -> Selection:
     """Run every method at every spacing, one at a time so that times mean something, and estimate all errors."""
     jobs = []
@@ -127,7 +128,7 @@ def select(
         for factor in FACTORS:
             table = scenario.model_dump(mode="json") | {"spacing": factor * scenario.spacing}
             if _valid(table):
-                jobs.append(Job(table, method, device, wall_limit=wall_limit))
+                jobs.append(Job(table, method, target, wall_limit=wall_limit))
     return assess(scenario, methods, execute(jobs, store, hooks))
 
 
@@ -146,7 +147,7 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Finished])
     result = Selection([], trust_of(scenario, methods), {}, list(runs))
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
-        own = [r for r in runs if r.ok and r.label == method]
+        own = [r for r in runs if r.ok and r.record["method"] == method]
         if len(own) < ENOUGH:
             result.notes.append(f"{method}: only {len(own)} spacings completed, {ENOUGH} are needed")
             continue
@@ -156,8 +157,8 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Finished])
     if not trusted:
         result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
     for run in runs:
-        if run.ok and run.label in fits:
-            result.candidates.append(_candidate(run, fits[run.label], consensus))
+        if run.ok and run.record["method"] in fits:
+            result.candidates.append(_candidate(run, fits[run.record["method"]], consensus))
     return result
 
 
@@ -210,8 +211,8 @@ def _candidate(run: Finished, fits: dict[str, Fit], consensus: dict[str, float])
     discretisation, bias = max(parts, key=sum)
     cost = record["cost"]
     return Candidate(
-        run.label, record["spacing_m"], cost["mean_dt_s"], cost["wall_s"], cost["wall_per_simulated_s"], discretisation,
-        bias, run,
+        record["method"], record["spacing_m"], cost["mean_dt_s"], cost["wall_s"], cost["wall_per_simulated_s"],
+        discretisation, bias, run,
     )  # fmt: skip
 
 

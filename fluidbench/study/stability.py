@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..library import validate
 from ..measure.reference import table as reference
 from ..scenario import Scenario
 from ..solver import configure, get_solver, refusal
+from ..target import Target
 from ..timestep import damped_limit
 from .experiments import Task
 
@@ -72,7 +73,7 @@ def choose(names: Sequence[str]) -> dict[str, Axis]:
 
 
 def point_tasks(
-    scenario: Scenario, axes: dict[str, Axis], methods: Sequence[str], quick: bool, device: str
+    scenario: Scenario, axes: dict[str, Axis], methods: Sequence[str], quick: bool, target: Target
 ) -> list[tuple[str, Task]]:
     """(label, task) of every point of every axis; particles per cell are a matter of MPM alone."""
     tasks = []
@@ -81,7 +82,7 @@ def point_tasks(
             for value in axis.quick if quick else axis.values:
                 task = {
                     "scenario": scenario.model_dump(mode="json"), "settings": axis.setting(scenario, value),
-                    "axis": name, "value": value, "method": method, "quick": quick, "device": device,
+                    "axis": name, "value": value, "method": method, "quick": quick, "target": asdict(target),
                 }  # fmt: skip
                 tasks.append((f"{name}-{method}", task))
     return tasks
@@ -101,22 +102,22 @@ def measure_point(task: Task) -> dict[str, Any]:
         return row | {"verdict": REFUSED, "reason": str(error).splitlines()[0]}
     if reason is not None:
         return row | {"verdict": REFUSED, "reason": reason}
-    device, precision = task["device"], 0.2 if task["quick"] else 0.05
+    target, precision = Target(**task["target"]), 0.2 if task["quick"] else 0.05
     own, binding = default_dt(scenario, solver, config)
-    trouble = lump_survives(scenario, solver, config, own, device)
+    trouble = lump_survives(scenario, solver, config, own, target)
     if trouble is None and not task["quick"]:
-        trouble = opening(scenario, task["method"], device)
+        trouble = opening(scenario, task["method"], target)
     row |= {
         "verdict": HELD if trouble is None else FAILED, "reason": trouble or "", "binding": binding, "dt_own_s": own,
         "dt_theory_s": theory(task["method"], scenario, config),
     }  # fmt: skip
     if task["method"] == "pbd":  # no bound of stability: is it still sound far beyond its bound of accuracy?
-        beyond = lump_survives(scenario, solver, config, 8 * own, device) is None
+        beyond = lump_survives(scenario, solver, config, 8 * own, target) is None
         limit = Limit(8 * own, math.inf) if beyond else Limit(own, 8 * own)
     else:
-        limit = bisect(lambda dt: lump_survives(scenario, solver, config, dt, device) is None, own, precision, 8.0)
+        limit = bisect(lambda dt: lump_survives(scenario, solver, config, dt, target) is None, own, precision, 8.0)
         still = block(block_material(scenario), scenario.spacing).model_copy(update={"numerics": scenario.numerics})
-        row["dt_block_s"] = block_limit(still, solver, config, own, precision, device).dt
+        row["dt_block_s"] = block_limit(still, solver, config, own, precision, target).dt
     return row | {"dt_lump_s": limit.stable, "lump_limit_found": math.isfinite(limit.unstable)}
 
 
@@ -145,11 +146,11 @@ def block_material(scenario: Scenario) -> dict[str, Any]:
     return m
 
 
-def opening(scenario: Scenario, method: str, device: str) -> str | None:
+def opening(scenario: Scenario, method: str, target: Target) -> str | None:
     """None if the scenario's first steps go well, otherwise what went wrong."""
     from ..simulation import Simulation
 
-    sim = Simulation(scenario, method, device)
+    sim = Simulation(scenario, method, target)
     substeps = 0
     while substeps < OPENING_STEPS and sim.done < sim.ticks:
         substeps += sim.advance().substeps
@@ -201,11 +202,11 @@ BLOCKS = {
 """Materials whose limit is known."""
 
 
-def block_tasks(methods: Sequence[str], quick: bool, device: str) -> list[tuple[str, Task]]:
+def block_tasks(methods: Sequence[str], quick: bool, target: Target) -> list[tuple[str, Task]]:
     """The blocks of validation H, for methods that have a theory."""
     return [
         (f"block-{kind}-{method}", {"kind": kind, "method": method, "precision": 0.1 if quick else 0.03,
-                                    "device": device})
+                                    "target": asdict(target)})
         for method in methods if method in ("mpm", "sph") for kind in BLOCKS
     ]  # fmt: skip
 
@@ -218,7 +219,7 @@ def measure_block(task: Task) -> dict[str, Any]:
     config = solver.Config(**BARE.get(task["method"], {}))
     scenario = block(BLOCKS[task["kind"]], 0.01)
     own, _ = default_dt(scenario, solver, config)
-    limit = block_limit(scenario, solver, config, own, task["precision"], task["device"])
+    limit = block_limit(scenario, solver, config, own, task["precision"], Target(**task["target"]))
     return {
         "kind": task["kind"], "method": task["method"], "dt_limit_s": limit.dt, "dt_own_s": own,
         "dt_theory_s": theory(task["method"], scenario, config),

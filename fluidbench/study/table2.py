@@ -9,6 +9,7 @@ from statistics import mean, stdev
 from ..library import load
 from ..run import Job
 from ..store import Store
+from ..target import Target
 from .execute import Finished, Hooks, execute
 from .verdicts import CONFIRMED, EFFECT, OPEN, REFUTED
 
@@ -44,7 +45,7 @@ class Row:
 
 def table2(
     methods: Sequence[str], pools: Sequence[int | None], repeats: int, quick: bool, store: Store, hooks: Hooks,
-    device: str, wall_limit: float,
+    target: Target, wall_limit: float,
 ) -> list[Row]:  # fmt: skip
     """All rows, one run at a time so that times mean something; without pictures first."""
     rows = []
@@ -55,7 +56,7 @@ def table2(
                 table = scenario.model_dump(mode="json")
                 groups = []
                 for every in (None, PICTURE):
-                    jobs = [Job(table, method, device, repeat=r, wall_limit=wall_limit, film_every=every)
+                    jobs = [Job(table, method, target, repeat=r, wall_limit=wall_limit, film_every=every)
                             for r in range(repeats)]  # fmt: skip
                     groups.append(execute(jobs, store, hooks))
                 rows.append(Row(variant, pool, method, *groups))

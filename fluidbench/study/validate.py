@@ -18,6 +18,7 @@ from ..run import Job
 from ..scenario import Scenario
 from ..solver import configure, get_solver
 from ..store import Store, write_atomically
+from ..target import Target
 from .case import METHOD_OF_LAW, Case, Finding, Run
 from .execute import Finished, Hooks, execute
 
@@ -53,7 +54,7 @@ class Trial:
 
 
 def plan(
-    chosen: Sequence[Case], methods: Sequence[str], levels: Sequence[str], quick: bool, device: str,
+    chosen: Sequence[Case], methods: Sequence[str], levels: Sequence[str], quick: bool, target: Target,
     wall_limit: float | None,
 ) -> list[Trial]:  # fmt: skip
     """Every trial with its jobs; a method that is skipped has none and says why."""
@@ -74,7 +75,7 @@ def plan(
                 if method in case.skipped:
                     trial.verdict, trial.note = SKIPPED, case.skipped[method]
                 else:
-                    trial.jobs = _jobs(case.scenarios(spacing), method, device, wall_limit)
+                    trial.jobs = _jobs(case.scenarios(spacing), method, target, wall_limit)
                 trials.append(trial)
     return trials
 
@@ -85,11 +86,11 @@ def _factor(level: str) -> float:
     return LEVELS[level]
 
 
-def _jobs(scenarios: dict[str, Scenario], method: str, device: str, wall_limit: float | None) -> dict[str, Job]:
+def _jobs(scenarios: dict[str, Scenario], method: str, target: Target, wall_limit: float | None) -> dict[str, Job]:
     for scenario in scenarios.values():
         configure(get_solver(method), scenario)
     return {
-        label: Job(scenario.model_dump(mode="json"), method, device, wall_limit=wall_limit, keep_frames=True)
+        label: Job(scenario.model_dump(mode="json"), method, target, wall_limit=wall_limit, keep_frames=True)
         for label, scenario in scenarios.items()
     }
 

@@ -7,6 +7,7 @@ from fluidbench.solver import solver_names
 from fluidbench.store import Store
 from fluidbench.study.case import cases
 from fluidbench.study.validate import EXEMPT, MISS, PASS, plan, run
+from fluidbench.target import HERE
 
 CHEAP = [
     ("free_fall", "mpm"), ("conservation_ledger", "mpm"), ("conservation_ledger", "sph"),
@@ -22,7 +23,7 @@ ALL = [(name, method) for name, case in cases().items() for method in solver_nam
 
 def judged(tmp_path, name, method, levels=("coarse",)):
     """The trials of a case, run and judged."""
-    trials = plan([cases()[name]], [method], levels, False, "cpu", 1800.0)
+    trials = plan([cases()[name]], [method], levels, False, HERE, 1800.0)
     run(trials, Store(tmp_path), 1, *[lambda *_: None] * 4)
     return trials
 

@@ -5,6 +5,7 @@ import pytest
 from fluidbench.measure.ledger import ledger, lengths
 from fluidbench.simulation import Simulation, Verdict
 from fluidbench.solver import solver_names
+from fluidbench.target import Target
 
 from ..conftest import bead
 
@@ -15,7 +16,7 @@ def test_cuda_agrees_with_the_cpu(name):
     s = bead(duration=0.4)
     rows = []
     for device in ("cpu", "cuda:0"):
-        sim = Simulation(s, name, device)
+        sim = Simulation(s, name, Target(device))
         assert sim.run().verdict is Verdict.COMPLETED
         frame = sim.frame()
         rows.append({**ledger(frame, s), **lengths(frame, s)})

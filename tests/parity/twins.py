@@ -8,6 +8,7 @@ import warp as wp
 from fluidbench.particles import CARRIED, CLAMPED, FREE
 from fluidbench.scenario import Scenario
 from fluidbench.simulation import Simulation
+from fluidbench.target import BACKENDS, Target
 from solvers.pbd.laws import conveyed_modulus
 
 TOLERANCE = 2e-5  # float32; sums may be taken in another order
@@ -39,7 +40,7 @@ class Twins:
     """A scenario through one method, in Warp and in Taichi."""
 
     def __init__(self, worlds: Scenario | list[Scenario], method: str, ticks: int) -> None:
-        self.warp, self.taichi = (Simulation(worlds, method, backend=b, graphs=False) for b in ("warp", "taichi"))
+        self.warp, self.taichi = (Simulation(worlds, method, Target(backend=b), graphs=False) for b in BACKENDS)
         self.method = method
         for sim in (self.warp, self.taichi):
             sim.prepare()

@@ -28,6 +28,7 @@ from fluidbench.study.verdicts import (
     share_within,
     winners,
 )
+from fluidbench.target import HERE
 from fluidbench.timestep import lost_speed
 
 
@@ -48,7 +49,7 @@ def test_a_block_of_mpm_has_the_limit_of_theory():
     solver = get_solver("mpm")
     config, scenario = solver.Config(), block({"density": 1000.0, "sound_speed": 10.0}, 0.01)
     own, _ = default_dt(scenario, solver, config)
-    found = block_limit(scenario, solver, config, own, 0.1, "cpu")
+    found = block_limit(scenario, solver, config, own, 0.1, HERE)
     assert found.dt == pytest.approx(theory("mpm", scenario, config), rel=0.2)
     assert found.dt * 10.0 / 0.02 == pytest.approx(1.29, rel=0.2)
 
@@ -56,7 +57,7 @@ def test_a_block_of_mpm_has_the_limit_of_theory():
 @pytest.mark.parametrize("name", AXES)
 def test_every_axis_makes_valid_points_or_refuses(name):
     scenario = load("line_bead")
-    tasks = point_tasks(scenario, choose([name]), ["mpm"], True, "cpu")
+    tasks = point_tasks(scenario, choose([name]), ["mpm"], True, HERE)
     assert tasks
     for _, task in tasks:
         try:
@@ -66,7 +67,7 @@ def test_every_axis_makes_valid_points_or_refuses(name):
 
 
 def test_a_point_beyond_its_sound_is_refused_with_the_reason():
-    task = point_tasks(load("line_bead"), choose(["exit_speed"]), ["sph"], True, "cpu")[-1][1]
+    task = point_tasks(load("line_bead"), choose(["exit_speed"]), ["sph"], True, HERE)[-1][1]
     row = measure_point(task)
     assert row["verdict"] == "refused" and "too near its own sound" in row["reason"]
 
@@ -74,8 +75,8 @@ def test_a_point_beyond_its_sound_is_refused_with_the_reason():
 def record(method, spacing, **measures):
     cost = {"mean_dt_s": 1e-4, "wall_s": spacing**-4, "wall_per_simulated_s": spacing**-4, "cpu_s": spacing**-4}
     return Finished(
-        {"verdict": "completed", "method": method, "device": "cpu", "spacing_m": spacing, "measures": measures,
-         "answers": [], "cost": cost}, Path("nowhere"), False,
+        {"verdict": "completed", "method": method, "device": "cpu", "backend": "warp", "spacing_m": spacing,
+         "measures": measures, "answers": [], "cost": cost}, Path("nowhere"), False,
     )  # fmt: skip
 
 

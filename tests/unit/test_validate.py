@@ -8,6 +8,7 @@ from fluidbench.errors import UserError
 from fluidbench.solver import solver_names
 from fluidbench.study.case import Finding, cases, select
 from fluidbench.study.validate import EXEMPT, LEVELS, MISS, PASS, SKIPPED, Trial, _judge, orders, plan
+from fluidbench.target import HERE
 
 every_case = pytest.mark.parametrize("case", cases().values(), ids=lambda c: c.name)
 
@@ -51,9 +52,9 @@ def test_order_is_the_slope_over_the_spacings():
 
 
 def test_plan_skips_with_a_reason_and_quick_leaves_out_the_dear():
-    (skipped,) = plan([cases()["pbd_stiffness"]], ["mpm"], ["coarse"], False, "cpu", None)
+    (skipped,) = plan([cases()["pbd_stiffness"]], ["mpm"], ["coarse"], False, HERE, None)
     assert skipped.verdict == SKIPPED and skipped.note and not skipped.jobs
-    quick = plan(list(cases().values()), solver_names(), ["coarse"], True, "cpu", None)
+    quick = plan(list(cases().values()), solver_names(), ["coarse"], True, HERE, None)
     assert {t.case.physics for t in quick} >= {"liquid", "viscous", "yield stress", "elastic", "emission"}
     assert all(t.method not in t.case.exempt for t in quick)
 
@@ -62,4 +63,4 @@ def test_mistakes_are_named():
     with pytest.raises(UserError, match="did you mean 'free_fall'"):
         select(["free_fal"])
     with pytest.raises(UserError, match="rough, coarse, medium, fine"):
-        plan([cases()["free_fall"]], ["mpm"], ["finest"], False, "cpu", None)
+        plan([cases()["free_fall"]], ["mpm"], ["finest"], False, HERE, None)
