@@ -1,6 +1,7 @@
 """Where a run happens."""
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 DEFAULT_BACKEND = "warp"
 BACKENDS = {"warp": "warp-lang", "taichi": "taichi"}  # the packages that they come in
@@ -18,6 +19,12 @@ class Target:
     def suffix(self) -> str:
         """What sets a label apart: nothing for the default backend."""
         return "" if self.backend == DEFAULT_BACKEND else f" ({self.backend})"
+
+    @property
+    def other(self) -> "Target | None":
+        """The same in the other backend, on as many threads as this one; None where that is not installed."""
+        backend = next(b for b in BACKENDS if b != self.backend)
+        return Target(self.device, backend, self.threads) if find_spec(backend) is not None else None
 
 
 HERE = Target()

@@ -202,14 +202,14 @@ def _present(results: list["Finished"], root: Path, console: Any) -> None:
     """Tables in the terminal; figures, tables and the page in the folder."""
     from ..report.figures import draw, draw_views
     from ..report.html import write_page
-    from ..report.tables import against_reference, costs, fidelity, successes
+    from ..report.tables import against_reference, backends, costs, fidelity, successes
     from ..report.tables import show as print_table
     from ..report.traces import plots
     from ..study.compare import tidy, write_tables
     from ..study.execute import ADVICE
 
     write_tables(tidy(results), root)
-    made = (fidelity(results), successes(results), against_reference(results), costs(results))
+    made = (fidelity(results), successes(results), against_reference(results), costs(results), backends(results))
     tables = [table for table in made if table is not None]
     drawn = plots(results)
     views = draw_views(results, root)

@@ -216,7 +216,7 @@ def table1(
     A second call reuses the runs that are finished.
     """
     from ..report.table1 import report
-    from ..study.evidence import METHODS, chosen_cases, gather, levels_of, planned, shipped
+    from ..study.evidence import COST_CASES, METHODS, chosen_cases, gather, levels_of, planned, shipped
     from ..study.execute import Hooks
     from ..study.validate import plan, run
 
@@ -225,17 +225,22 @@ def table1(
     resolved = load_scenario(scenario, set_, coarser * resolved.spacing)
     target = target_of(device, backend, threads)
     methods, store, workers = _prepare(",".join(METHODS), target, out, "table1", jobs)
-    trials = [
-        trial for case in chosen_cases(quick)
-        for trial in plan([case], methods, levels_of(case, quick), False, target, wall_limit)
-    ]  # fmt: skip
-    with _watch("known answers", len(trials)) as tell:
-        none = lambda *_: None  # noqa: E731
-        run(trials, store, workers, none, none, none, lambda t: tell(f"{t.case.name} {t.method} {t.verdict}"))
-    trials += shipped() if quick else []
+
+    def known_answers(chosen: list[Any], where: "Target") -> list[Any]:
+        trials = [t for c in chosen for t in plan([c], methods, levels_of(c, quick), False, where, wall_limit)]
+        with _watch(f"known answers{where.suffix}", len(trials)) as tell:
+            none = lambda *_: None  # noqa: E731
+            run(trials, store, workers, none, none, none, lambda t: tell(f"{t.case.name} {t.method} {t.verdict}"))
+        return trials
+
+    trials = known_answers(chosen_cases(quick), target) + (shipped() if quick else [])
+    others = []
+    if target.other is not None and not quick:
+        others = known_answers([case for case in chosen_cases(quick) if case.name in COST_CASES], target.other)
     with _watch("the scenario", planned(repeats)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
         evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, target, wall_limit)
+    evidence.other_trials = others
     _publish(report(evidence, store.root), store.root)
 
 

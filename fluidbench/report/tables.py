@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from statistics import mean, stdev
 from typing import TYPE_CHECKING, Any
 
-from ..study.compare import binding
+from ..study.compare import binding, lengths_of
 from ..study.execute import Finished
 
 if TYPE_CHECKING:
@@ -121,6 +121,31 @@ def costs(results: Sequence[Finished]) -> Table:
         table.rows.append([label(key), *[spread([r["cost"][key] for r in g]) if g else "-" for g in groups.values()]])
     table.rows.append(["binding bound", *[binding(g[0]) if g else "-" for g in groups.values()]])
     return table
+
+
+def backends(results: Sequence[Finished]) -> Table | None:
+    """The same method through two backends: cost of both with the ratio, and how far apart their lengths are; None
+    where nothing ran in two."""
+    table = Table("Backends", ["", "first", "second", "second / first"])
+    groups: dict[str, dict[str, dict[str, Any]]] = {}
+    for result in results:
+        if result.ok and result.record["repeat"] == 0:
+            groups.setdefault(result.record["method"], {})[result.record["backend"]] = result.record
+    for method, pair in groups.items():
+        if len(pair) != 2:
+            continue
+        first, second = pair.values()
+        table.head[1:3] = pair
+        for key in ("particle_substeps_per_s", "particle_substeps_per_cpu_s", "wall_s", "prepare_s"):
+            a, b = first["cost"][key], second["cost"][key]
+            table.rows.append([f"{method}: {label(key)}", number(a), number(b), number(b / a) if a else "-"])
+        before, after = lengths_of(first), lengths_of(second)
+        apart = {key: abs(after[key] - value) for key, value in before.items() if key.endswith("_m") and key in after}
+        if apart:
+            key, resolution = max(apart, key=lambda k: apart[k]), first["measures"]["resolution_m"]
+            within = f"{apart[key] / resolution:.2g} of the resolution"
+            table.rows.append([f"{method}: {label(key)}, apart most", number(before[key]), number(after[key]), within])
+    return table if table.rows else None
 
 
 UNITS = {"m": "m", "m2": "m²", "kg": "kg", "J": "J", "s": "s", "MiB": "MiB"}

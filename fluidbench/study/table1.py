@@ -60,7 +60,9 @@ class Cell:
 
 def table1(e: Evidence) -> list[Cell]:
     """Every cell of the paper's table, then its claims in words."""
-    return [*paradigm(), *fidelity(e), *stability(e), *cost(e), *best_for(e), *limits(e), *claims(e)]
+    return [
+        *paradigm(), *fidelity(e), *stability(e), *cost(e), *best_for(e), *limits(e), *claims(e), *frameworks(e)
+    ]  # fmt: skip
 
 
 def paradigm() -> list[Cell]:
@@ -103,9 +105,9 @@ def fidelity(e: Evidence) -> list[Cell]:
     return cells
 
 
-def _figures(e: Evidence, key: str) -> dict[str, list[float]]:
+def _figures(repeats: dict[str, list[Finished]], key: str) -> dict[str, list[float]]:
     """A cost figure of every completed repeat; methods that never completed are missing."""
-    found = {m: [r.record["cost"][key] for r in runs if r.ok] for m, runs in e.repeats.items()}
+    found = {m: [r.record["cost"][key] for r in runs if r.ok] for m, runs in repeats.items()}
     return {m: values for m, values in found.items() if values}
 
 
@@ -120,7 +122,7 @@ def stability(e: Evidence) -> list[Cell]:
         "sph": ("low, smaller dt", "lowest"),
         "pbd": ("high, larger dt", "highest"),
     }
-    speed, dts = e.scenario.wave_speed, _figures(e, "mean_dt_s")
+    speed, dts = e.scenario.wave_speed, _figures(e.repeats, "mean_dt_s")
     measured = {
         m: [r["dt_lump_s"] * speed / (r["value"] * e.scenario.spacing) for r in rows if r["verdict"] == "held"]
         for m, rows in e.limits.items()
@@ -139,7 +141,7 @@ def stability(e: Evidence) -> list[Cell]:
 
 def cost(e: Evidence) -> list[Cell]:
     words = {"mpm": ("mid-high", "upper"), "sph": ("high", "highest"), "pbd": ("low", "lowest")}
-    walls = _figures(e, "wall_per_simulated_s")
+    walls = _figures(e.repeats, "wall_per_simulated_s")
     places = ranked(walls)
     enough = len(places) == 3 and min(map(len, walls.values())) > 1
     cells = []
@@ -149,18 +151,23 @@ def cost(e: Evidence) -> list[Cell]:
             measured = f"{mean(walls[m]):.3g} ± {spread:.1g} wall s / simulated s"
             verdict = placed(places[m], place) if enough else OPEN
             cells.append(Cell("cost at equal spacing", m, word, measured, "compare", "cost", verdict, e.repeats[m]))
-    trials = {name: [t for t in e.trials if t.case.name == name] for name in COST_CASES}
-    equal = {name: costs for name, own in trials.items() if len(costs := at_equal_error(own)) == 3}
     for m, (word, place) in words.items():
-        shares = ", ".join(f"{n}: x {costs[m] / min(costs.values()):.2g}" for n, costs in equal.items())
-        tops = [placed(ranked({k: [v] for k, v in costs.items()})[m], place) for costs in equal.values()]
-        verdict = OPEN
-        if len(tops) >= FEWEST:
-            verdict = CONFIRMED if tops.count(CONFIRMED) > len(tops) / 2 else REFUTED
+        verdict, shares = equal_error(e.trials, m, place)
         measured = f"over the cheapest: {shares or 'no case that all three can run at several spacings'}"
-        runs = _runs_of([t for own in trials.values() for t in own if t.method == m])
+        runs = _runs_of([t for t in e.trials if t.case.name in COST_CASES and t.method == m])
         cells.append(Cell("cost at equal error", m, word, measured, "validate, levels", "equal error", verdict, runs))
     return cells
+
+
+def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, str]:
+    """(verdict on a method's place, its times over the cheapest) at the error that all three reach."""
+    every = {name: at_equal_error([t for t in trials if t.case.name == name]) for name in COST_CASES}
+    equal = {name: costs for name, costs in every.items() if len(costs) == 3}
+    shares = ", ".join(f"{n}: x {costs[method] / min(costs.values()):.2g}" for n, costs in equal.items())
+    tops = [placed(ranked({k: [v] for k, v in costs.items()})[method], place) for costs in equal.values()]
+    if len(tops) < FEWEST:
+        return OPEN, shares
+    return CONFIRMED if tops.count(CONFIRMED) > len(tops) / 2 else REFUTED, shares
 
 
 def best_for(e: Evidence) -> list[Cell]:
@@ -176,7 +183,7 @@ def best_for(e: Evidence) -> list[Cell]:
         cells.append(
             Cell("best for", m, word, f"cheapest within tolerance on: {tally}", "validate", "best", verdict, runs)
         )
-    walls = _figures(e, "wall_per_simulated_s")
+    walls = _figures(e.repeats, "wall_per_simulated_s")
     paces = ", ".join(f"{k} {mean(v):.3g}" for k, v in walls.items())
     verdict = placed(ranked(walls)["pbd"], "lowest") if len(walls) == 3 else OPEN
     measured = f"at equal spacing, wall s / simulated s: {paces}"
@@ -185,7 +192,7 @@ def best_for(e: Evidence) -> list[Cell]:
 
 def limits(e: Evidence) -> list[Cell]:
     cells = []
-    sizes = _figures(e, "bytes_per_particle")
+    sizes = _figures(e.repeats, "bytes_per_particle")
     if len(sizes) == 3:
         volume = e.scenario.spacing**3
         measured = ", ".join(f"{m} {v[0]:.0f} B ({v[0] / volume / 1e9:.3g} GB/m^3)" for m, v in sizes.items())
@@ -253,7 +260,7 @@ def _widths(runs: Sequence[Finished]) -> list[float]:
 def claims(e: Evidence) -> list[Cell]:
     """The sentences of the paper's text."""
     cells = []
-    dts, walls = _figures(e, "mean_dt_s"), _figures(e, "wall_per_simulated_s")
+    dts, walls = _figures(e.repeats, "mean_dt_s"), _figures(e.repeats, "wall_per_simulated_s")
     if {"mpm", "sph"} <= set(dts) and len(walls) == 3:
         ratio = mean(dts["mpm"]) / mean(dts["sph"])
         cells.append(Cell(
@@ -297,3 +304,37 @@ def bead_width(e: Evidence) -> Cell:
         lines.append(", ".join(f"{m} {1e3 * w:.1f} mm" for m, w in widths.items()) + f": off by {off:.0%}")
     measured = "; ".join(lines) or "a method did not lay a bead"
     return Cell("claim", "pbd", word, measured, "compare, two spacings", "prediction", agreed(verdicts), runs)
+
+
+def frameworks(e: Evidence) -> list[Cell]:
+    """Each verdict on cost once more: does it hold in the other backend, or was it the implementation's?"""
+    lines = (
+        ("cost at equal spacing", "mpm", "mid-high", "upper"), ("cost at equal spacing", "sph", "high", "highest"),
+        ("cost at equal spacing", "pbd", "low", "lowest"), ("claim", "sph", "would be the most expensive", "highest"),
+        ("best for", "pbd", "real-time previews", "lowest"),
+    )  # fmt: skip
+    both = [_figures(runs, "wall_per_simulated_s") for runs in (e.repeats, e.other)]
+    runs = _all(e) + [run for group in e.other.values() for run in group]
+    cells = []
+    for row, m, word, place in lines:
+        decided = all(len(walls) == 3 and min(map(len, walls.values())) > 1 for walls in both)
+        verdicts = [placed(ranked(walls)[m], place) for walls in both] if decided else []
+        costs = "; ".join(", ".join(f"{k} {mean(v):.3g}" for k, v in walls.items()) for walls in both if walls)
+        measured = f"here and in the other backend, wall s / simulated s: {costs}"
+        cells.append(_held(row, m, word, measured, "compare, both backends", verdicts, runs))
+    for m, word, place in (("mpm", "mid-high", "upper"), ("sph", "high", "highest"), ("pbd", "low", "lowest")):
+        found = [equal_error(trials, m, place) for trials in (e.trials, e.other_trials)]
+        verdicts = [verdict for verdict, _ in found] if OPEN not in {verdict for verdict, _ in found} else []
+        measured = "here and in the other backend, over the cheapest: " + "; ".join(s or "not run" for _, s in found)
+        runs_of = _runs_of([t for t in e.other_trials if t.method == m])
+        cells.append(_held("cost at equal error", m, word, measured, "validate, both backends", verdicts, runs_of))
+    return cells
+
+
+def _held(
+    row: str, method: str, word: str, measured: str, experiment: str, verdicts: Sequence[str], runs: list[Finished]
+) -> Cell:
+    """Whether a verdict is the same in both backends; `verdicts` is empty where one of them has none."""
+    verdict = OPEN if not verdicts else CONFIRMED if len(set(verdicts)) == 1 else REFUTED
+    measured = f"{' and '.join(verdicts) or 'not decided in both'}; {measured}"
+    return Cell(f"in both frameworks: {row}", method, word, measured, experiment, "frameworks", verdict, runs)

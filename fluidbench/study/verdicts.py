@@ -28,6 +28,8 @@ RULES = {
     f"factor of {EFFECT:g} and two standard deviations",
     "equal error": f"ordered by the time to reach the error that all three reach, a factor of {EFFECT:g} apart, on "
     f"most of at least {FEWEST} cases",
+    "frameworks": "confirmed: the cost rule of the verdict says the same of the methods written in Warp and in Taichi; "
+    "refuted: it says otherwise in one of them",
     "cost": f"methods ordered by the figure; a place needs a factor of {EFFECT:g}, and means more than two standard "
     "deviations of the repeats apart",
     "best": "the method that is cheapest, among those within tolerance, on most known answers of the class",
