@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fluidbench.errors import UserError
+from fluidbench.layout import sample
 from fluidbench.library import load, parse_override, shipped, validate
 from fluidbench.material import Material
 from fluidbench.timestep import Bound, damped_limit, plan
@@ -155,3 +156,12 @@ def test_force_field_has_a_potential_whose_gradient_it_is():
     assert np.allclose(slope, s.acceleration + np.array(pull) @ (x - [0.1, 0.0, 0.05]), atol=1e-6)
     with pytest.raises(UserError, match="must be symmetric"):
         scenario(body_force_gradient=[[0, 1, 0], [0, 0, 0], [0, 0, 0]])
+
+
+@pytest.mark.parametrize("spacing", [0.0101, 0.011, 0.0125, 0.0137])
+def test_a_body_that_a_symmetry_plane_halves_keeps_half_its_mass(spacing):
+    ball = {"kind": "sphere", "center": [0.0, 0.0, 0.5], "radius": 0.05}
+    s = scenario(domain={"lower": [0, 0, 0], "upper": [1, 1, 1]}, bodies=[ball], spacing=spacing)
+    points, volume = sample(s.bodies[0], s)
+    assert len(points) * volume == pytest.approx(s.bodies[0].volume / 4, rel=1e-9)
+    assert points[:, :2].min() > 0.4 * spacing
