@@ -70,6 +70,16 @@ def test_several_worlds_are_the_same_in_both_languages(method):
     twins.check(get_solver(method).passes)
 
 
+@pytest.mark.gpu
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("method", ["mpm", "sph", "pbd"])
+def test_every_pass_is_the_same_in_both_languages_on_a_gpu(method, name):
+    twins = Twins(CASES[name], method, 6, "cuda:0")
+    twins.check(get_solver(method).passes)
+    twins.disturb(1)
+    twins.check(get_solver(method).passes)
+
+
 @ti.kernel
 def too_fast(
     capacity: int, count: ti.types.ndarray(dtype=ti.i32, ndim=1), dt: ti.types.ndarray(dtype=ti.f32, ndim=1),

@@ -12,6 +12,7 @@ from fluidbench.target import BACKENDS, Target
 from solvers.pbd.laws import conveyed_modulus
 
 TOLERANCE = 2e-5  # float32; sums may be taken in another order
+BY_CHANCE = ("table", "block_of", "bonds.partner", "bonds.rest")  # in the order in which threads come, on a GPU
 GARBAGE = 1.0e6  # in slots that nobody may touch
 
 
@@ -39,8 +40,8 @@ def arrays_of(sim: Simulation) -> dict[str, wp.array]:
 class Twins:
     """A scenario through one method, in Warp and in Taichi."""
 
-    def __init__(self, worlds: Scenario | list[Scenario], method: str, ticks: int) -> None:
-        self.warp, self.taichi = (Simulation(worlds, method, Target(backend=b), graphs=False) for b in BACKENDS)
+    def __init__(self, worlds: Scenario | list[Scenario], method: str, ticks: int, device: str = "cpu") -> None:
+        self.warp, self.taichi = (Simulation(worlds, method, Target(device, b), graphs=False) for b in BACKENDS)
         self.method = method
         for sim in (self.warp, self.taichi):
             sim.prepare()
@@ -133,6 +134,8 @@ class Twins:
     def differences(self) -> Iterator[str]:
         """One sentence for every array that is not the same."""
         for name in self.shared:
+            if name in BY_CHANCE and not self.warp.scene.device.is_cpu:
+                continue
             a, b = self.ours[name].numpy(), self.theirs[name].numpy()
             if name == "neighbours.entries":
                 yield from self._lists(a, b)
