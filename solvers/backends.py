@@ -59,8 +59,8 @@ def backend_of(name: str, device: wp.Device, threads: int) -> Backend:
         return Warp(device)
     try:
         from .taichi_bridge import Taichi
-    except ImportError:
+    except ImportError as error:
         raise UserError(
-            "the backend taichi is not installed: pip install taichi (its wheels end at Python 3.13)"
+            f"the backend taichi cannot be loaded ({error}): pip install taichi (its wheels end at Python 3.13)"
         ) from None
     return Taichi(device, threads)

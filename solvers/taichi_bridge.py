@@ -156,14 +156,16 @@ class Taichi:
             kernel(*parts)
 
     def prepare(self, solver: Any) -> None:
-        """Taichi compiles a kernel when it is called: one substep of an empty pool calls them all."""
-        count = solver.pool.count
-        active = count.numpy().copy()
-        count.zero_()
+        """Taichi compiles a kernel when it is called: one substep of an empty pool calls them all. What the pool holds
+        is put back: a pass may copy whole arrays."""
+        arrays = [solver.pool.count, *solver.pool.fields.values()]
+        kept = [wp.clone(array) for array in arrays]
+        solver.pool.count.zero_()
         solver.refresh()
         solver.substep()
         self.wait()
-        count.assign(active)
+        for array, before in zip(arrays, kept, strict=True):
+            wp.copy(array, before)
 
     def _translated(self, argument: Any) -> list[Any]:
         """What a Warp argument is to Taichi; arrays and structures are kept, so they must not be replaced."""
@@ -178,31 +180,48 @@ class Taichi:
         ti.sync()
 
 
-class _Eavesdropper:
-    """Stands in for Taichi's program during one call, to learn what is launched and with what."""
+class _Listener:
+    """Stands in for one of Taichi's objects during a call: passes everything on, and keeps the calls of methods."""
 
-    def __init__(self, program: Any) -> None:
-        self.program = program
+    def __init__(self, target: Any) -> None:
+        self.target, self.calls = target, []
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self.program, name)
+        method = getattr(self.target, name)
 
-    def launch_kernel(self, compiled: Any, context: Any) -> None:
-        self.heard = (compiled, context)
-        self.program.launch_kernel(compiled, context)
+        def passed_on(*args: Any) -> Any:
+            self.calls.append((method.__name__, args))
+            return method(*(a.target if isinstance(a, _Listener) else a for a in args))
+
+        return passed_on
 
 
 def _recorded(kernel: Callable, parts: list[Any]) -> Callable[[], None]:
-    """Call a compiled kernel and return what calls it again with the same arguments."""
-    runtime = ti.lang.impl.get_runtime()
-    program = runtime.prog
-    runtime.prog = _Eavesdropper(program)
+    """Call a compiled kernel and return what calls it again with the same arguments.
+
+    Taichi fills a launch context for every call, in Python, argument by argument, with checks; the second time the same
+    calls are made without. (The context itself cannot be kept: on CUDA a launch consumes it.)
+    """
+    runtime, primal = ti.lang.impl.get_runtime(), kernel._primal
+    compiled_kernel = primal.compiled_kernels[primal.ensure_compiled(*parts)]
+    program, context = runtime.prog, _Listener(compiled_kernel.make_launch_context())
+    function, listening = _Listener(compiled_kernel), _Listener(program)
+    function.make_launch_context = lambda: context
+    runtime.prog = listening
     try:
-        kernel(*parts)
-        compiled, context = runtime.prog.heard
+        primal.launch_kernel(function, *parts)
     finally:
         runtime.prog = program
-    return lambda: program.launch_kernel(compiled, context)
+    (compiled,) = [args[0] for name, args in listening.calls if name == "launch_kernel"]
+    settings = [(name, args) for name, args in context.calls]
+
+    def again() -> None:
+        fresh = compiled_kernel.make_launch_context()
+        for name, args in settings:
+            getattr(fresh, name)(*args)
+        program.launch_kernel(compiled, fresh)
+
+    return again
 
 
 def _translate(argument: Any) -> list[Any]:

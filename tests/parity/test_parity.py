@@ -1,9 +1,12 @@
 """Every pass of every method gives in Taichi what it gives in Warp: from states that runs bring about and from random
 ones, with unused slots, held particles, all kinds of walls, several worlds, curing, growing and bonded matter."""
 
+import numpy as np
 import pytest
 
+from fluidbench.simulation import Simulation
 from fluidbench.solver import get_solver
+from fluidbench.target import Target
 
 from ..conftest import scenario
 
@@ -97,3 +100,14 @@ def test_a_planted_error_is_found_and_its_pass_is_named(monkeypatch):
     monkeypatch.setattr(twins.taichi.solver.kernels, "velocities", too_fast)
     with pytest.raises(Difference, match=r"pbd\.velocities: pool\.velocity differs by 0\.0001 of"):
         twins.check(get_solver("pbd").passes)
+
+
+@pytest.mark.parametrize("name", ["viscous", "paste", "solid"])
+@pytest.mark.parametrize("method", ["mpm", "sph", "pbd"])
+def test_preparing_changes_nothing(method, name):
+    """Taichi compiles by running: velocities, holds and stresses must come out as they went in."""
+    sim = Simulation(CASES[name], method, Target(backend="taichi"))
+    before = {key: array.numpy().copy() for key, array in sim.pool.fields.items()}
+    sim.prepare()
+    for key, array in sim.pool.fields.items():
+        assert np.array_equal(before[key], array.numpy()), key
