@@ -9,6 +9,7 @@ from fluidbench.particles import CARRIED, CLAMPED, FREE
 from fluidbench.scenario import Scenario
 from fluidbench.simulation import Simulation
 from fluidbench.target import BACKENDS, Target
+from solvers.pbd.bonds import DAMPED
 from solvers.pbd.laws import conveyed_modulus
 
 TOLERANCE = 2e-5  # float32; sums may be taken in another order
@@ -57,17 +58,19 @@ class Twins:
         self.equalise()
 
     def _least_scales(self) -> dict[str, float]:
-        """Of what is made of numbers that cancel: PBD's multipliers of densities of order 1, its stress of elastic
-        tensors of order 1."""
+        """Of what is made of numbers that cancel: PBD's multipliers of densities of order 1, those of its bonds of
+        lengths of a spacing, its stress of elastic tensors of order 1."""
         sim = self.warp
         if self.method != "pbd":
             return {}
+        masses = sim.pool.mass.numpy()
+        least = {"multiplier": 1.0, "bonds.multiplier": DAMPED * sim.scene.spacing * masses[masses > 0].min() / 2.0}
         if not sim.scene.flowing:
-            return {"multiplier": 1.0}
+            return least
         modulus, density = (float(sim.scene.phases.numpy()[key].max()) for key in ("shear_modulus", "density"))
         dt = float(sim.scene.dt.numpy()[0])
         acts = conveyed_modulus(modulus, sim.config.shear_stiffness, density, sim.scene.spacing, dt)
-        return {"multiplier": 1.0, "stress": acts}
+        return least | {"stress": acts}
 
     def equalise(self) -> None:
         """Give Taichi's twin the state of Warp's."""
@@ -154,6 +157,10 @@ class Twins:
         """Neighbour lists are sets: what they hold counts, not in which order."""
         limit, number = self.warp.solver.neighbours.limit, self.ours["neighbours.number"].numpy()
         held = np.arange(limit) < number[:, None]
-        first, second = (np.sort(np.where(held, x.reshape(-1, limit), -1), axis=1) for x in (a, b))
+        by_slot = self.warp.solver.neighbours.column == 1  # on a GPU the lists lie side by side instead
+        first, second = (
+            np.sort(np.where(held, x.reshape(-1, limit) if by_slot else x.reshape(limit, -1).T, -1), axis=1)
+            for x in (a, b)
+        )
         if (first != second).any():
             yield f"neighbours.entries differ for {int((first != second).any(axis=1).sum())} particles"
