@@ -14,9 +14,11 @@ WARP_NAMES = {"sqrt": wp.sqrt, "exp": wp.exp, "pow": wp.pow, "min": wp.min, "max
 
 
 def rebound(law: Callable, names: Mapping[str, object]) -> Callable:
-    """The same code with other globals; `inspect` still finds its source."""
+    """The same code with other globals; `inspect` still finds its source, by the code."""
     copy = types.FunctionType(law.__code__, {**law.__globals__, **names}, law.__name__, law.__defaults__)
-    return functools.update_wrapper(copy, law)
+    functools.update_wrapper(copy, law)
+    del copy.__wrapped__  # a language that compiles it must not take it for a decorated function
+    return copy
 
 
 @functools.cache

@@ -33,21 +33,22 @@ Phases = ti.types.ndarray(dtype=ti.f32, ndim=3)  # world, level of cure, paramet
 Forces = ti.types.ndarray(dtype=ti.f32, ndim=2)  # world, component: uniform, then gradient by rows
 SCALARS = {wp.float32: ti.f32, wp.int32: ti.i32, wp.vec3: vec3, wp.vec3i: ivec3, wp.mat33: mat3}
 TYPESTR = {wp.float32: "<f4", wp.int32: "<i4", wp.int64: "<i8"}
-_started: dict[str, tuple[str, int]] = {}
+REPLAYS = ti.__name__ == "taichi"  # a fork has launches of its own, which are left alone
+_running: list[tuple[str, int]] = []  # architecture and threads, once started
 
 
 def start(device: str, threads: int) -> None:
     """Start Taichi for a device, once in a process; raises UserError when it runs with other settings already."""
     wanted = ("cpu" if device == "cpu" else "cuda", threads)
-    running = _started.setdefault("taichi", wanted)
-    if running != wanted:
-        raise UserError(f"taichi runs on {running} in this process already and cannot be restarted for {wanted}")
-    if ti.lang.impl.get_runtime().prog is None:
+    if not _running:
         with contextlib.redirect_stdout(io.StringIO()):
             ti.init(
                 arch=getattr(ti, wanted[0]), cpu_max_num_threads=threads, default_fp=ti.f32, default_ip=ti.i32,
                 offline_cache=True, log_level=ti.ERROR,
             )  # fmt: skip
+        _running.append(wanted)
+    if _running[0] != wanted:
+        raise UserError(f"taichi runs on {_running[0]} in this process already and cannot be restarted for {wanted}")
 
 
 @functools.cache
@@ -149,7 +150,7 @@ class Taichi:
             self._replays[call]()
             return
         parts = [part for argument in arguments for part in self._translated(argument)]
-        if call in self._compiled:
+        if call in self._compiled and REPLAYS:
             self._replays[call] = _recorded(kernel, parts)
         else:
             self._compiled.add(call)
