@@ -54,6 +54,17 @@ def target_of(device: str, backend: str, threads: int) -> "Target":
     return Target(device, backend, threads if backend != "warp" and device == "cpu" else 1)
 
 
+def targets_of(device: str, backends: str, threads: int) -> "list[Target]":
+    """A target for each of several backends, separated by commas."""
+    names = split(backends)
+    if not names:
+        raise UserError(f"--backend '{backends}' names no backend")
+    for name in names:
+        if names.count(name) > 1:
+            raise UserError(f"--backend names {name} twice; --repeats runs each method several times")
+    return [target_of(device, name, threads) for name in names]
+
+
 def _check_device(device: str) -> None:
     if device == "cpu":
         return

@@ -21,6 +21,7 @@ from .app import (
     load_scenario,
     split,
     target_of,
+    targets_of,
 )
 
 if TYPE_CHECKING:
@@ -161,9 +162,7 @@ def _study(
 
     scenario = load_scenario(name, settings, spacing, quick)
     methods = split(solvers) or solver_names()
-    device, backends, threads = where
-    targets = [target_of(device, backend, threads) for backend in split(backends)]
-    planned = jobs(scenario, methods, repeats, targets, wall_limit, frames, film_every)
+    planned = jobs(scenario, methods, repeats, targets_of(*where), wall_limit, frames, film_every)
     console, errors = Console(), Console(stderr=True)
     for warning in scenario.warnings():
         errors.print(f"warning: {warning}", markup=False, highlight=False)

@@ -28,6 +28,10 @@ MISTAKES = [
     (["compare", "line_bead", "--solvers", "mpn"], "did you mean 'mpm'"),
     (["compare", "line_bead", "--set", "numerics.mpm.grid_rato=2"], "did you mean 'grid_ratio'"),
     (["compare", "line_bead", "--device", "cuda:7"], "no device 'cuda:7'"),
+    (["compare", "line_bead", "--backend", "warp,taichy"], "did you mean 'taichi'"),
+    (["compare", "line_bead", "--backend", "warp,warp"], "names warp twice"),
+    (["compare", "line_bead", "--backend", ","], "names no backend"),
+    (["table2", "--pools", "298k"], "--pools takes whole numbers"),
     (["run", "line_bead", "--out", "/proc/nowhere"], "cannot write"),
     (["show", "line_bead", "--set", "material.density=-3"], "material.density"),
     (["validate", "free_fal"], "did you mean 'free_fall'"),
@@ -59,6 +63,23 @@ def test_compare_writes_tables_figures_and_a_self_contained_page(tmp_path):
     again = fluidbench("compare", "line_bead", *TINY, "--out", str(tmp_path))
     assert again.returncode == 0
     assert before == {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}
+
+
+def test_two_backends_are_two_rows_with_cost_ratio_and_the_same_lengths(tmp_path):
+    pytest.importorskip("taichi")
+    arguments = [*TINY, "--solvers", "mpm,pbd", "--backend", "warp,taichi", "--threads", "2", "--out", str(tmp_path)]
+    done = fluidbench("compare", "line_bead", *arguments)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Backends" in done.stdout and "second / first" in done.stdout
+    table = pd.read_parquet(tmp_path / "compare.parquet")
+    assert list(zip(table["method"], table["backend"], table["threads"], strict=True)) == [
+        ("mpm", "warp", 1), ("mpm", "taichi", 2), ("pbd", "warp", 1), ("pbd", "taichi", 2)
+    ]  # fmt: skip
+    assert (table["verdict"] == "completed").all() and table["machine_arch"].notna().all()
+    assert table["machine_backend_version"].nunique() == 2
+    for method in ("mpm", "pbd"):
+        width = table.loc[table["method"] == method, "bead_width_m"]
+        assert abs(width.iloc[1] - width.iloc[0]) < table["resolution_m"].iloc[0]
 
 
 def test_resume_after_a_kill(tmp_path):
