@@ -214,12 +214,12 @@ def _recorded(kernel: Callable, parts: list[Any]) -> Callable[[], None]:
     finally:
         runtime.prog = program
     (compiled,) = [args[0] for name, args in listening.calls if name == "launch_kernel"]
-    settings = [(name, args) for name, args in context.calls]
+    settings = [(getattr(type(context.target), name), args) for name, args in context.calls]
 
     def again() -> None:
         fresh = compiled_kernel.make_launch_context()
-        for name, args in settings:
-            getattr(fresh, name)(*args)
+        for set_argument, args in settings:
+            set_argument(fresh, *args)
         program.launch_kernel(compiled, fresh)
 
     return again

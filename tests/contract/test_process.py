@@ -55,6 +55,14 @@ def test_spawning_splits_mass_exactly(method, ratio, jitter):
     assert abs(len(after["mass"]) / len(before["mass"]) / ratio - 1) < 0.25
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_growth_without_splitting_keeps_its_particles(method):
+    before, after, _ = ran(foam({"expansion": {"ratio": 1.4, "time": 0.05, "split": False}}), method)
+    assert len(after["mass"]) == len(before["mass"]) and (after["mass"] == before["mass"]).all()
+    grown = after["volume"].astype(float).sum() / before["volume"].astype(float).sum()
+    assert grown == pytest.approx(1.4, rel=0.02)
+
+
 def test_the_same_seed_gives_the_same_offspring_for_every_method():
     model = {"kind": "spawn", "ratio": 2.5, "passes": 3, "interval": 0.01, "delay": 0.04, "jitter": 0.03}
     litters = [ran(foam({"expansion": model}), method)[1] for method in METHODS]
