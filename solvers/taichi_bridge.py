@@ -129,6 +129,8 @@ class Taichi:
     name = "taichi"
 
     def __init__(self, device: wp.Device, threads: int) -> None:
+        if not device.is_cpu and device.ordinal != 0:
+            raise UserError(f"the backend taichi runs on cuda:0 alone, not on {device}; set CUDA_VISIBLE_DEVICES")
         self.device, self.threads = device, threads
         self._known: dict[int, tuple[Any, list[Any]]] = {}
         self._compiled: set[tuple[Any, ...]] = set()
