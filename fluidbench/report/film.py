@@ -1,10 +1,11 @@
-"""Pictures taken while a run goes on: the solver hands over a copy of the particles, another process draws it.
+"""Pictures taken while a run goes on: the solver hands over a copy of the particles, other processes draw it.
 
 The run only writes arrays to disk; drawing takes as long as it takes, beside it. `python -m fluidbench.report.film
-FOLDER` is the other process: it draws what it finds until it finds the word that the run has ended.
+FOLDER FIRST EVERY` is such a process: it draws frames FIRST, FIRST + EVERY, ... until the run has ended.
 """
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -15,10 +16,11 @@ import numpy as np
 
 ENDED = "ended"
 PATIENCE = 600.0  # longest wait for the last pictures after a run has ended [s]
+DRAWERS = max(1, min(4, (os.cpu_count() or 1) - 1))  # one core is the run's
 
 
 class Film:
-    """Takes a frame every `every` simulated seconds; `close` waits for the drawing process."""
+    """Takes a frame every `every` simulated seconds; `close` waits for the drawing processes."""
 
     def __init__(self, folder: Path, scenario: dict[str, Any], every: float) -> None:
         self.folder, self.every, self.next, self.shots = folder, every, 0.0, 0
@@ -26,7 +28,11 @@ class Film:
         (folder / ENDED).unlink(missing_ok=True)
         (folder / "scenario.json").write_text(json.dumps(scenario))
         with (folder / "log.txt").open("w") as log:
-            self.drawer = subprocess.Popen([sys.executable, "-m", __name__, str(folder)], stdout=log, stderr=log)
+            self.drawers = [
+                subprocess.Popen([sys.executable, "-m", __name__, str(folder), str(i), str(DRAWERS)], stdout=log,
+                                 stderr=log)
+                for i in range(DRAWERS)
+            ]  # fmt: skip
 
     def due(self, time: float) -> bool:
         return time >= self.next - 1e-9
@@ -47,23 +53,25 @@ class Film:
 
     def close(self) -> None:
         (self.folder / ENDED).touch()
-        self.drawer.wait(timeout=PATIENCE)
+        for drawer in self.drawers:
+            drawer.wait(timeout=PATIENCE)
 
 
-def draw_all(folder: Path) -> None:
-    """Draw every frame as it appears, in order, as frame_00000.png."""
+def draw_all(folder: Path, first: int, every: int) -> None:
+    """Draw each `every`-th frame from the `first` on as it appears, as frame_00000.png and so on."""
     from fluidbench.scenario import Scenario
 
     scenario = Scenario.model_validate(json.loads((folder / "scenario.json").read_text()))
-    canvas, drawn = _Canvas(scenario), 0
+    canvas, shot = _Canvas(scenario), first
     while True:
-        path = folder / f"frame_{drawn:05d}.npz"
+        ended = (folder / ENDED).exists()  # asked first: what is not there by then will not come
+        path = folder / f"frame_{shot:05d}.npz"
         if path.exists():
             with np.load(path) as data:
                 canvas.draw({key: data[key] for key in data.files}, path.with_suffix(".png"))
             path.unlink()
-            drawn += 1
-        elif (folder / ENDED).exists():
+            shot += every
+        elif ended:
             return
         else:
             time.sleep(0.02)
@@ -101,4 +109,4 @@ class _Canvas:
 
 
 if __name__ == "__main__":
-    draw_all(Path(sys.argv[1]))
+    draw_all(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
