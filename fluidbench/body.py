@@ -53,6 +53,8 @@ class Body(Model):
         missing = [key for key in needs if getattr(self, key) is None]
         if missing:
             raise ValueError(f"a {self.kind} needs {' and '.join(missing)}")
+        if self.start > 0 and (self.velocity_gradient or self.wave or any(self.angular_velocity)):
+            raise ValueError("a body that appears later moves as a whole: give it a velocity alone")
         if self.size is not None and min(self.size) <= 0:
             raise ValueError(f"size must be positive, got {self.size}")
         return self

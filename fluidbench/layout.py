@@ -21,7 +21,8 @@ def sample(body: Body, scenario: Scenario) -> tuple[np.ndarray, float]:
     cells = np.maximum(1, np.rint(edges / scenario.spacing).astype(int))
     faces = np.stack([scenario.domain.lower, scenario.domain.upper])
     halved = (np.abs(faces - np.asarray(body.center)) < 1e-9 * edges).any(axis=0)
-    cells += halved * (cells % 2)  # an odd number would put a layer of particles into the face that cuts it
+    even = 2 * np.maximum(1, np.rint(edges / (2 * scenario.spacing)).astype(int))
+    cells = np.where(halved, even, cells)  # an odd number would put a layer of particles into the face that cuts it
     step = edges / cells if body.kind == "box" else np.full(3, scenario.spacing)
     if body.kind == "cylinder":
         step[2] = edges[2] / cells[2]

@@ -109,6 +109,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
 
     scenario = Scenario.model_validate(job.scenario)
     solver = get_solver(job.method)
+    about = machine(job.target)
     start = time.perf_counter()
     simulation = Simulation(scenario, solver, job.target)
     rows: list[dict[str, float]] = []
@@ -153,7 +154,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         "approximations": approximations(solver, scenario, simulation.config),
         "warnings": scenario.warnings(),
         "config": simulation.config.model_dump(), "input": scenario.model_dump(mode="json"),
-        "machine": machine(job.target),
+        "machine": about,
     }  # fmt: skip
     write_atomically(folder / RECORD, json.dumps(record, indent=1))
     return record

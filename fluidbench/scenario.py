@@ -174,8 +174,8 @@ class Scenario(Model):
                 raise ValueError(f"bodies.{i} lies outside the domain")
             if (2 * body.extent < self.spacing).any():
                 raise ValueError(f"bodies.{i} is thinner than one particle spacing ({self.spacing} m)")
-            if body.start >= self.duration:
-                raise ValueError(f"bodies.{i}: start = {body.start} s is not before the end, {self.duration} s")
+            if body.start > 0 and body.start > self.duration - self.schedule[0]:
+                raise ValueError(f"bodies.{i}: start = {body.start} s is not before the last tick of {self.duration} s")
 
     def _check_periodic(self) -> None:
         for axis, periodic in enumerate(self.domain.walls.periodic()):

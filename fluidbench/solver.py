@@ -144,10 +144,7 @@ def get_solver(name: str) -> type[Solver]:
 def check_backend(solver: type[Solver], target: Target) -> None:
     """Raise UserError unless the method has the target's backend."""
     if target.backend not in solver.backends:
-        raise UserError(
-            f"{solver.name} has no backend '{target.backend}'{suggestion(target.backend, solver.backends)}; it has "
-            f"{' and '.join(solver.backends)}"
-        )
+        raise UserError(f"{solver.name} has no backend '{target.backend}'; it has {' and '.join(solver.backends)}")
 
 
 class Demands:

@@ -3,17 +3,28 @@
 from dataclasses import dataclass
 from importlib.util import find_spec
 
+from .errors import UserError
+
 DEFAULT_BACKEND = "warp"
 BACKENDS = {"warp": "warp-lang", "taichi": "taichi"}  # the packages that they come in
 
 
 @dataclass(frozen=True)
 class Target:
-    """Device, language of the kernels, and threads on the CPU; Warp runs one thread there."""
+    """Device, language of the kernels, and threads on the CPU; Warp runs one thread there.
+
+    Raises UserError for Taichi on a second GPU, which it would not use.
+    """
 
     device: str = "cpu"
     backend: str = DEFAULT_BACKEND
     threads: int = 1
+
+    def __post_init__(self) -> None:
+        if self.backend == "taichi" and self.device not in ("cpu", "cuda:0"):
+            raise UserError(f"the backend taichi runs on cuda:0 alone, not on {self.device}; set CUDA_VISIBLE_DEVICES")
+        if self.backend == "warp" or self.device != "cpu":
+            object.__setattr__(self, "threads", 1)
 
     @property
     def suffix(self) -> str:
@@ -22,9 +33,9 @@ class Target:
 
     @property
     def other(self) -> "Target | None":
-        """The same in the other backend, on as many threads as this one; None where that is not installed."""
+        """The other backend on this device, on one thread; None where it is not installed."""
         backend = next(b for b in BACKENDS if b != self.backend)
-        return Target(self.device, backend, self.threads) if find_spec(backend) is not None else None
+        return Target(self.device, backend) if find_spec(backend) is not None else None
 
 
 HERE = Target()

@@ -11,8 +11,6 @@ import warp as wp
 
 from fluidbench.errors import UserError
 
-NAMES = ("warp", "taichi")
-
 
 class Backend(Protocol):
     """Launches kernels; a kernel's arguments are the inputs, then the outputs."""

@@ -1,12 +1,10 @@
 """Corrected kernel gradients and stresses seen in walls, in Taichi: see corrected.py."""
 
-import taichi as ti
-
 from fluidbench.scene import FRICTION, SLIP
 
 from .corrected import SINGULAR, SOUND
 from .neighbours_taichi import face_kind
-from .taichi_bridge import symmetric
+from .taichi_bridge import symmetric, ti
 
 
 @ti.func

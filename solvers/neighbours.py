@@ -284,6 +284,10 @@ class Neighbours:
             self.grid = wp.HashGrid(*_grid_shape(self.pool.size))
             self.grid.reserve(self.pool.size, with_groups=True)
 
+    def prepare(self) -> None:
+        """Compile the search."""
+        wp.load_module(__name__, device=self.scene.device)
+
     def refresh(self) -> None:
         """The pool was changed from outside: make the lists anew at the next substep."""
         self.outdated.fill_(1)

@@ -4,13 +4,12 @@ A bucket holds the particles of all cells that hash to it, side by side; who lie
 key. Buckets get their places in no order: a counter hands them out.
 """
 
-import taichi as ti
 import warp as wp
 
 from fluidbench.scene import PERIODIC, STICK, Box
 
 from .neighbours import FAULT_NEIGHBOURS, INDEX_BITS, INDEX_MASK, Lists, Neighbours
-from .taichi_bridge import Ints, Vectors, ivec3, struct_of, vec3
+from .taichi_bridge import Ints, Vectors, ivec3, struct_of, ti, vec3
 
 BoxT, ListsT = struct_of(Box), struct_of(Lists)
 Keys = ti.types.ndarray(dtype=ti.i64, ndim=1)
@@ -245,6 +244,9 @@ class TaichiNeighbours(Neighbours):
         self.key = wp.zeros(size, dtype=wp.int64, device=device)
         self.start, self.filled = (wp.zeros(buckets, dtype=int, device=device) for _ in range(2))
         self.members = wp.zeros(size, dtype=int, device=device)
+
+    def prepare(self) -> None:
+        """Nothing: Taichi compiles when a substep is run (Taichi.prepare)."""
 
     def update(self) -> None:
         pool = self.pool

@@ -19,7 +19,7 @@ import taichi as ti
 
 from fluidbench.device import note_launch
 from fluidbench.errors import UserError
-from fluidbench.scene import Force, Phase
+from fluidbench.scene import Phase
 
 from .bind import rebound
 
@@ -31,9 +31,9 @@ Quads = ti.types.ndarray(dtype=vec4, ndim=1)
 Matrices = ti.types.ndarray(dtype=mat3, ndim=1)
 Phases = ti.types.ndarray(dtype=ti.f32, ndim=3)  # world, level of cure, parameter in the order of scene.Phase
 Forces = ti.types.ndarray(dtype=ti.f32, ndim=2)  # world, component: uniform, then gradient by rows
-SCALARS = {wp.float32: ti.f32, wp.int32: ti.i32, wp.vec3: vec3, wp.vec3i: ivec3, wp.mat33: mat3}
+SCALARS = {wp.float32: ti.f32, wp.int32: ti.i32, wp.vec3: vec3, wp.vec3i: ivec3}
 TYPESTR = {wp.float32: "<f4", wp.int32: "<i4", wp.int64: "<i8"}
-REPLAYS = ti.__name__ == "taichi"  # a fork has launches of its own, which are left alone
+REPLAYS = ti.__name__ == "taichi" and ti.__version__[:2] == (1, 7)  # others launch in ways of their own: left alone
 _running: list[tuple[str, int]] = []  # architecture and threads, once started
 
 
@@ -46,6 +46,8 @@ def start(device: str, threads: int) -> None:
                 arch=getattr(ti, wanted[0]), cpu_max_num_threads=threads, default_fp=ti.f32, default_ip=ti.i32,
                 offline_cache=True, log_level=ti.ERROR,
             )  # fmt: skip
+        if ti.cfg.arch not in ({ti.x64, ti.arm64} if wanted[0] == "cpu" else {ti.cuda}):
+            raise UserError(f"taichi could not start on {wanted[0]} and took {ti.cfg.arch} instead")
         _running.append(wanted)
     if _running[0] != wanted:
         raise UserError(f"taichi runs on {_running[0]} in this process already and cannot be restarted for {wanted}")
@@ -68,7 +70,7 @@ def struct_of(struct: Any) -> Any:
     return ti.types.struct(**{name: SCALARS[var.type] for name, var in struct.vars.items() if var.type in SCALARS})
 
 
-PhaseT, ForceT = struct_of(Phase), struct_of(Force)
+PhaseT = struct_of(Phase)
 
 
 @ti.func
@@ -129,8 +131,6 @@ class Taichi:
     name = "taichi"
 
     def __init__(self, device: wp.Device, threads: int) -> None:
-        if not device.is_cpu and device.ordinal != 0:
-            raise UserError(f"the backend taichi runs on cuda:0 alone, not on {device}; set CUDA_VISIBLE_DEVICES")
         self.device, self.threads = device, threads
         self._known: dict[int, tuple[Any, list[Any]]] = {}
         self._compiled: set[tuple[Any, ...]] = set()
@@ -238,9 +238,7 @@ def _translate(argument: Any) -> list[Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A Warp vector or matrix as a Taichi one."""
-    if isinstance(value, wp.mat33):
-        return mat3(*[float(value[i, j]) for i in range(3) for j in range(3)])
+    """A Warp vector as a Taichi one."""
     if isinstance(value, wp.vec3i):
         return ivec3(*[int(v) for v in value])
     return vec3(*[float(v) for v in value]) if isinstance(value, wp.vec3) else value

@@ -47,11 +47,24 @@ def target_of(device: str, backend: str, threads: int) -> "Target":
     from ..target import BACKENDS, Target
 
     if backend not in BACKENDS:
-        raise UserError(f"no backend '{backend}'{suggestion(backend, list(BACKENDS))}; there are {', '.join(BACKENDS)}")
+        raise UserError(f"no backend '{backend}'{suggestion(backend, list(BACKENDS))}")
     if find_spec(backend) is None:
         raise UserError(f"the backend {backend} is not installed: pip install {BACKENDS[backend]}")
     _check_device(device)
-    return Target(device, backend, threads if backend != "warp" and device == "cpu" else 1)
+    return Target(device, backend, threads)
+
+
+def one_target(device: str, backend: str, threads: int) -> "Target":
+    """`target_of` for a verb with one backend; raises UserError for threads that it would not use."""
+    target = target_of(device, backend, threads)
+    if target.threads != threads:
+        raise UserError(f"--threads {threads} is for taichi on the CPU; warp runs one thread there, a GPU its own")
+    return target
+
+
+def workers_for(jobs: int | None, target: "Target") -> int:
+    """Runs at a time: as asked, or as many as two cores hold; one on a GPU."""
+    return jobs or (max(1, 2 // target.threads) if target.device == "cpu" else 1)
 
 
 def targets_of(device: str, backends: str, threads: int) -> "list[Target]":
@@ -62,6 +75,8 @@ def targets_of(device: str, backends: str, threads: int) -> "list[Target]":
     for name in names:
         if names.count(name) > 1:
             raise UserError(f"--backend names {name} twice; --repeats runs each method several times")
+    if len(names) == 1:
+        return [one_target(device, names[0], threads)]
     return [target_of(device, name, threads) for name in names]
 
 

@@ -19,9 +19,10 @@ from .app import (
     WallLimit,
     app,
     load_scenario,
+    one_target,
     split,
-    target_of,
     targets_of,
+    workers_for,
 )
 
 if TYPE_CHECKING:
@@ -104,16 +105,18 @@ def validate(
     from rich.console import Console
 
     from ..report.validation import present
-    from ..solver import solver_names
+    from ..solver import check_backend, get_solver, solver_names
     from ..store import Store
     from ..study.case import select
     from ..study.validate import plan
 
     methods = split(solvers) or solver_names()
-    target = target_of(device, backend, threads)
+    target = one_target(device, backend, threads)
+    for method in methods:
+        check_backend(get_solver(method), target)
     trials = plan(select(cases or []), methods, split(levels), quick, target, wall_limit)
     store = Store((out or Path("fluidbench-out") / "validate").resolve())
-    _validate(trials, store, jobs or (2 if device == "cpu" else 1), Console(stderr=True))
+    _validate(trials, store, workers_for(jobs, target), Console(stderr=True))
     if not present(trials, store.root, Console(width=None if sys.stdout.isatty() else 120)):
         raise typer.Exit(1)
 

@@ -20,8 +20,9 @@ from .app import (
     count_of,
     fraction,
     load_scenario,
+    one_target,
     split,
-    target_of,
+    workers_for,
 )
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def stability(
     from ..study.stability import block_tasks, choose, measure_block, measure_point, point_tasks
 
     resolved, axes = load_scenario(scenario, set_, spacing), choose(split(axis))
-    target = target_of(device, backend, threads)
+    target = one_target(device, backend, threads)
     methods, store, workers = _prepare(solvers, target, out, "stability", jobs)
     blocks = block_tasks(methods, quick, target)
     points = point_tasks(resolved, axes, methods, quick, target)
@@ -86,7 +87,7 @@ def _prepare(
     for method in methods:
         check_backend(get_solver(method), target)
     store = Store((out or Path("fluidbench-out") / verb).resolve())
-    return methods, store, jobs or (2 if target.device == "cpu" else 1)
+    return methods, store, workers_for(jobs, target)
 
 
 def _judged(cases: list[Any], methods: list[str], target: "Target", store: "Store", workers: int) -> list[Any]:
@@ -152,7 +153,7 @@ def ablate(
     from ..study.execute import Hooks
 
     resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
-    target = target_of(device, backend, threads)
+    target = one_target(device, backend, threads)
     methods, store, workers = _prepare(solvers, target, out, "ablate", jobs)
     total = len(methods) + sum(len(methods) if c.method is None else 1 for c in changes(resolved, methods))
     with _watch("ablate", total) as tell:
@@ -187,7 +188,7 @@ def select(
 
     resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
     seconds, pace = budget_of(budget)
-    target = target_of(device, backend, threads)
+    target = one_target(device, backend, threads)
     methods, store, _ = _prepare(solvers, target, out, f"select-{resolved.name}", 1)
     with _watch("select", len(methods) * len(FACTORS)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
@@ -223,7 +224,7 @@ def table1(
     coarser = 4 / 3 if quick and spacing is None else 1.0
     resolved = load_scenario(scenario, set_, spacing)
     resolved = load_scenario(scenario, set_, coarser * resolved.spacing)
-    target = target_of(device, backend, threads)
+    target = one_target(device, backend, threads)
     methods, store, workers = _prepare(",".join(METHODS), target, out, "table1", jobs)
 
     def known_answers(chosen: list[Any], where: "Target") -> list[Any]:
@@ -237,7 +238,7 @@ def table1(
     others = []
     if target.other is not None and not quick:
         others = known_answers([case for case in chosen_cases(quick) if case.name in COST_CASES], target.other)
-    with _watch("the scenario", planned(repeats)) as tell:
+    with _watch("the scenario", planned(repeats, target)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
         evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, target, wall_limit)
     evidence.other_trials = others
@@ -265,7 +266,7 @@ def table2(
     from ..study.table2 import VARIANTS
     from ..study.table2 import table2 as study
 
-    target = target_of(device, backend, threads)
+    target = one_target(device, backend, threads)
     methods, store, _ = _prepare(solvers, target, out, "table2", 1)
     sizes = [None if part == "fit" else count_of(part, "--pools") for part in split(pools)]
     with _watch("table2", 2 * repeats * len(VARIANTS) * len(methods) * len(sizes)) as tell:

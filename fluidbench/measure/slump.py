@@ -8,7 +8,7 @@ from .deposit import Deposit
 
 def measure_slump(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     """Slump and spread of the first body, if it is a cylinder; front and height of it, if it is a box."""
-    if not scenario.bodies:
+    if not scenario.bodies or any(body.start > 0 for body in scenario.bodies):
         return {}
     body, floor = scenario.bodies[0], scenario.domain.lower[2]
     start = float(body.center[2] + body.extent[2]) - floor

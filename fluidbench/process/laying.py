@@ -9,7 +9,7 @@ from .stream import Stream
 
 
 class Laying:
-    """Places every body of a scenario at its start; whole layers appear at once and at rest, as in element birth."""
+    """Places every body of a scenario at its start; later ones appear whole, as in element birth."""
 
     def __init__(self, scenario: Scenario, pool: Pool) -> None:
         self.scenario, self.pool = scenario, pool

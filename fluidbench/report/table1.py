@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..study.evidence import Evidence
-from ..study.table1 import Cell, table1
+from ..study.table1 import IN_BOTH, Cell, table1
 from ..study.verdicts import OPEN, RULES
 from .study import Report, Runs, anchor, record_link
 from .tables import Link, Table
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def report(e: Evidence, root: Path) -> Report:
     cells = table1(e)
-    counts = Counter(c.verdict for c in cells)
+    counts = Counter(c.verdict for c in cells if not c.row.startswith(IN_BOTH))
     findings = ["Verdicts: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()) + "."]
     findings += [f"{c.row}, {c.method}: '{c.paper}': {c.verdict}. {c.measured}." for c in cells if c.verdict != OPEN]
     by_case: dict[str, list] = {}

@@ -127,18 +127,19 @@ def backends(results: Sequence[Finished]) -> Table | None:
     """The same method through two backends: cost of both with the ratio, and how far apart their lengths are; None
     where nothing ran in two."""
     table = Table("Backends", ["", "first", "second", "second / first"])
-    groups: dict[str, dict[str, dict[str, Any]]] = {}
+    groups: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for result in results:
-        if result.ok and result.record["repeat"] == 0:
-            groups.setdefault(result.record["method"], {})[result.record["backend"]] = result.record
+        if result.ok:
+            pair = groups.setdefault(result.record["method"], {})
+            pair.setdefault(result.record["backend"], []).append(result.record)
     for method, pair in groups.items():
         if len(pair) != 2:
             continue
-        first, second = pair.values()
         table.head[1:3] = pair
         for key in ("particle_substeps_per_s", "particle_substeps_per_cpu_s", "wall_s", "prepare_s"):
-            a, b = first["cost"][key], second["cost"][key]
-            table.rows.append([f"{method}: {label(key)}", number(a), number(b), number(b / a) if a else "-"])
+            a, b = ([r["cost"][key] for r in records] for records in pair.values())
+            table.rows.append([f"{method}: {label(key)}", spread(a), spread(b), number(mean(b) / mean(a))])
+        first, second = (records[0] for records in pair.values())
         before, after = lengths_of(first), lengths_of(second)
         apart = {key: abs(after[key] - value) for key, value in before.items() if key.endswith("_m") and key in after}
         if apart:

@@ -109,6 +109,7 @@ def _pbd(key: str, value: float, spacing: float) -> dict[str, Any]:
     return {f"numerics.pbd.{key}": value, "spacing": spacing}
 
 
-def planned(repeats: int) -> int:
+def planned(repeats: int, target: Target) -> int:
     """How many runs on the scenario `gather` makes."""
-    return len(METHODS) * (repeats + SPREAD + 1) + 2 * (len(GRID_RATIOS) + len(ITERATIONS) + len(ADVANCES))
+    other = SPREAD if target.other is not None else 0
+    return len(METHODS) * (repeats + other + 1) + 2 * (len(GRID_RATIOS) + len(ITERATIONS) + len(ADVANCES))

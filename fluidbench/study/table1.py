@@ -19,9 +19,11 @@ from .verdicts import (
     APART,
     COLLAPSE,
     CONFIRMED,
+    DIFFERS,
     EFFECT,
     FEWEST,
     GOOD,
+    HOLDS,
     JUDGED,
     OPEN,
     POOR,
@@ -40,6 +42,7 @@ CLASSES = {
 }
 VISCOSITIES, YIELDS = (1e-3, 1e3), (0.0, 1e4)  # ends of an axis: Pa s, Pa
 DEFORMATION = ("slump_cylinder", "self_weight_column", "cantilever_sag", "viscous_column_slip")
+IN_BOTH = "in both frameworks:"  # rows that ask a verdict on cost of the other backend, too
 COLLAPSING = ("collapse_threshold", "slump_slip")
 
 
@@ -328,13 +331,14 @@ def frameworks(e: Evidence) -> list[Cell]:
         measured = "here and in the other backend, over the cheapest: " + "; ".join(s or "not run" for _, s in found)
         runs_of = _runs_of([t for t in e.other_trials if t.method == m])
         cells.append(_held("cost at equal error", m, word, measured, "validate, both backends", verdicts, runs_of))
-    return cells
+    why = "all known answers would be needed in the other backend"
+    return [*cells, *(_held("best for", c.method, c.paper, why, "none", [], []) for c in best_for(e)[:2])]
 
 
 def _held(
     row: str, method: str, word: str, measured: str, experiment: str, verdicts: Sequence[str], runs: list[Finished]
 ) -> Cell:
     """Whether a verdict is the same in both backends; `verdicts` is empty where one of them has none."""
-    verdict = OPEN if not verdicts else CONFIRMED if len(set(verdicts)) == 1 else REFUTED
+    verdict = OPEN if not verdicts else HOLDS if len(set(verdicts)) == 1 else DIFFERS
     measured = f"{' and '.join(verdicts) or 'not decided in both'}; {measured}"
-    return Cell(f"in both frameworks: {row}", method, word, measured, experiment, "frameworks", verdict, runs)
+    return Cell(f"{IN_BOTH} {row}", method, word, measured, experiment, "frameworks", verdict, runs)

@@ -14,6 +14,7 @@ import numpy as np
 from .validate import Trial
 
 CONFIRMED, REFUTED, OPEN = "confirmed", "refuted", "not decidable"
+HOLDS, DIFFERS = "the same in both", "not the same in both"  # of a verdict, in the other backend
 EFFECT = 1.2  # two figures that differ by less than this factor count as equal
 GOOD, POOR = 0.75, 0.5  # share of known answers within tolerance that is high fidelity, or low
 FEWEST = 2  # known answers that a verdict on a class needs
@@ -28,8 +29,7 @@ RULES = {
     f"factor of {EFFECT:g} and two standard deviations",
     "equal error": f"ordered by the time to reach the error that all three reach, a factor of {EFFECT:g} apart, on "
     f"most of at least {FEWEST} cases",
-    "frameworks": "confirmed: the cost rule of the verdict says the same of the methods written in Warp and in Taichi; "
-    "refuted: it says otherwise in one of them",
+    "frameworks": "whether the rule of a verdict on cost says the same of the methods written in Warp and in Taichi",
     "cost": f"methods ordered by the figure; a place needs a factor of {EFFECT:g}, and means more than two standard "
     "deviations of the repeats apart",
     "best": "the method that is cheapest, among those within tolerance, on most known answers of the class",

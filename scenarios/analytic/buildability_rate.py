@@ -50,7 +50,6 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     clock, foot = runs["weak"].times, spread_of(runs["weak"])
     thin = WEIGHT * RISE - (1.0 + SPREAD) * math.sqrt(3.0) * RATES["weak"]
     wanted = RISE * (1.0 + SPREAD) * math.sqrt(3.0) * YIELD / thin
-    onset = WEIGHT * RISE - math.sqrt(3.0) * RATES["weak"]
     yielded = np.flatnonzero(foot > SPREAD)
     seen = RISE * float(clock[yielded[0]]) if len(yielded) else math.inf
     held = float(spread_of(runs["strong"]).max())
@@ -59,7 +58,6 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     numbers = (
         Number("height at which the foot has spread by 4 % [m]", seen, wanted),
         Number("spread of the strong column's foot", held, 0.0),
-        Number("height of first yield, slice theory [m]", RISE * math.sqrt(3.0) * YIELD / onset, wanted / (1 + SPREAD)),
     )
     section = WEIGHT * RISE * clock / (math.sqrt(3.0) * (YIELD + RATES["weak"] * clock))
     curve = Curve("foot", "time [s]", "growth of its section", clock, foot, clock, np.maximum(section - 1.0, 0.0))

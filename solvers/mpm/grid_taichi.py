@@ -3,11 +3,9 @@
 Functions over `axis` are unrolled: it is known when they are compiled.
 """
 
-import taichi as ti
-
 from fluidbench.scene import FRICTION, PERIODIC, STICK
 
-from ..taichi_bridge import ivec3, struct_of, vec3, vec4
+from ..taichi_bridge import ivec3, struct_of, ti, vec3, vec4
 from .grid import FAULT_BLOCKS, FIRST, Grid
 from .walls import CONTACT_BEGINS, CONTACT_ENDS
 

@@ -3,8 +3,6 @@
 import functools
 from types import SimpleNamespace
 
-import taichi as ti
-
 from fluidbench.particles import CARRIED, CLAMPED, FREE
 
 from .. import constitutive
@@ -25,6 +23,7 @@ from ..taichi_bridge import (
     struct_of,
     symmetric,
     taichi_func,
+    ti,
     vec3,
     vec4,
 )

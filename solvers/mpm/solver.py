@@ -12,10 +12,11 @@ from fluidbench.particles import Pool
 from fluidbench.scenario import Scenario
 from fluidbench.scene import Scene
 from fluidbench.solver import Config, Feature, Solver
+from fluidbench.target import BACKENDS
 from fluidbench.timestep import Bound, damped_limit
 
 from .. import aging
-from ..backends import NAMES, backend_of
+from ..backends import backend_of
 from ..order import CellOrder
 from ..readout import present_density, shear_stress
 from . import kernels_warp as kernels
@@ -42,7 +43,7 @@ class SolverMPM(Solver):
     name = "mpm"
     paradigm = "hybrid: particles carry state, a background grid carries momentum"
     features = frozenset(Feature)
-    backends: ClassVar = NAMES
+    backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigMPM
     passes = ("clear_grid", "p2g", "grid_step", "g2p")
     faults: ClassVar = {

@@ -1,13 +1,11 @@
 """Bonds of solids in PBD, in Taichi: the passes of bonds.py with the same arguments, written anew."""
 
-import taichi as ti
-
 from fluidbench.particles import CARRIED, CLAMPED, FREE
 from fluidbench.scene import PERIODIC, SLIP, STICK
 
 from ..neighbours import INDEX_BITS, INDEX_MASK
 from ..neighbours_taichi import BoxT, ListsT, digit, face_kind, image_position
-from ..taichi_bridge import Floats, Ints, Phases, Vectors, is_solid, phase_at, taichi_func, vec3
+from ..taichi_bridge import Floats, Ints, Phases, Vectors, is_solid, phase_at, taichi_func, ti, vec3
 from . import laws
 from .bonds import ANCHORED, BOUND, DAMPED, FAULT_BONDS, FRESH, GELLED, LOOSE, REACH, ROOM
 

@@ -3,8 +3,6 @@ equations."""
 
 from types import SimpleNamespace
 
-import taichi as ti
-
 from fluidbench.particles import CARRIED, FREE
 from fluidbench.scene import FRICTION, PERIODIC, STICK
 
@@ -26,6 +24,7 @@ from ..taichi_bridge import (
     rest_density,
     struct_of,
     taichi_func,
+    ti,
     vec3,
 )
 from . import laws

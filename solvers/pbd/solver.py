@@ -12,10 +12,11 @@ from fluidbench.particles import Pool
 from fluidbench.scenario import Scenario
 from fluidbench.scene import FRICTION, STICK, Scene
 from fluidbench.solver import Config, Feature, Solver
+from fluidbench.target import BACKENDS
 from fluidbench.timestep import Bound
 
-from .. import aging, neighbours
-from ..backends import NAMES, backend_of
+from .. import aging
+from ..backends import backend_of
 from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
 from ..order import CellOrder
 from ..readout import present_density
@@ -54,7 +55,7 @@ class SolverPBD(Solver):
     name = "pbd"
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
     features = frozenset(Feature) - {Feature.PRESSURE}
-    backends: ClassVar = NAMES
+    backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigPBD
     faults: ClassVar = {
         FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full",
@@ -297,8 +298,9 @@ class SolverPBD(Solver):
         )  # fmt: skip
 
     def prepare(self) -> None:
-        for module in (neighbours, aging):
-            wp.load_module(module, device=self.scene.device)
+        if self.scene.changes:
+            wp.load_module(aging, device=self.scene.device)
+        self.neighbours.prepare()
         self.backend.prepare(self)
 
     def sort_keys(self) -> Any:

@@ -4,8 +4,6 @@ equations."""
 import functools
 from types import SimpleNamespace
 
-import taichi as ti
-
 from fluidbench.particles import CARRIED, FREE
 from fluidbench.scene import FRICTION, PERIODIC
 
@@ -38,6 +36,7 @@ from ..taichi_bridge import (
     rest_density,
     struct_of,
     taichi_func,
+    ti,
     vec3,
 )
 from .kernels_warp import FLOOR, WHOLE, Smoothing

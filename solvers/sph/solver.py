@@ -13,10 +13,11 @@ from fluidbench.particles import Pool
 from fluidbench.scenario import Scenario
 from fluidbench.scene import Scene
 from fluidbench.solver import Config, Feature, Solver
+from fluidbench.target import BACKENDS
 from fluidbench.timestep import Bound
 
-from .. import aging, neighbours
-from ..backends import NAMES, backend_of
+from .. import aging
+from ..backends import backend_of
 from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
 from ..order import CellOrder
 from ..readout import shear_stress
@@ -63,7 +64,7 @@ class SolverSPH(Solver):
     name = "sph"
     paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
     features = frozenset(Feature)
-    backends: ClassVar = NAMES
+    backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigSPH
     passes = ("lists", "strain", "force", "move")
     OWN: ClassVar = ("new_density", "load", "stress", "rate", "acceleration")
@@ -220,8 +221,9 @@ class SolverSPH(Solver):
         )  # fmt: skip
 
     def prepare(self) -> None:
-        for module in (neighbours, aging):
-            wp.load_module(module, device=self.scene.device)
+        if self.scene.changes:
+            wp.load_module(aging, device=self.scene.device)
+        self.neighbours.prepare()
         self.backend.prepare(self)
 
     def sort_keys(self) -> Any:

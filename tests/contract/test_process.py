@@ -199,5 +199,5 @@ def test_a_layer_is_laid_at_its_time_and_stays_where_it_was_put(method):
 
 def test_a_layer_that_would_come_after_the_end_is_refused():
     late = [{"kind": "box", "center": [0, 0, 0], "size": [0.04] * 3, "start": 0.3}]
-    with pytest.raises(UserError, match=r"bodies\.0: start = 0\.3 s is not before the end"):
+    with pytest.raises(UserError, match=r"bodies\.0: start = 0\.3 s is not before the last tick"):
         foam({}, bodies=late)
