@@ -72,7 +72,7 @@ def main() -> None:
         method, target, particles, seconds = json.loads(a.one)
         print(json.dumps(measure(method, Target(**target), particles, seconds)))
         return
-    threads = [1, os.cpu_count() or 1] if a.device == "cpu" else [1]
+    threads = sorted({1, os.cpu_count() or 1}) if a.device == "cpu" else [1]
     targets = [Target(a.device, b, n) for b in BACKENDS for n in threads if b != "warp" or n == 1]
     head = ["method", "backend", "device", "threads", "particles", "particle-substeps/s", "the same per CPU s",
             "substeps/s", "compile s"]  # fmt: skip

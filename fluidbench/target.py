@@ -32,6 +32,13 @@ class Target:
         return "" if self.backend == DEFAULT_BACKEND else f" ({self.backend})"
 
     @property
+    def options(self) -> str:
+        """What a command line needs to run here, with a leading blank; nothing for the defaults."""
+        given = {"--device": self.device, "--backend": self.backend, "--threads": self.threads}
+        usual = {"--device": "cpu", "--backend": DEFAULT_BACKEND, "--threads": 1}
+        return "".join(f" {name} {value}" for name, value in given.items() if value != usual[name])
+
+    @property
     def other(self) -> "Target | None":
         """The other backend on this device, on one thread; None where it is not installed."""
         backend = next(b for b in BACKENDS if b != self.backend)

@@ -21,7 +21,7 @@ Settings = Annotated[list[str] | None, typer.Option("--set", help="override a ke
 Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], instead of the scenario's")]
 Device = Annotated[str, typer.Option(help="cpu, or cuda:0, cuda:1, ...")]
 Backend = Annotated[str, typer.Option(help="language of the kernels: warp or taichi")]
-Threads = Annotated[int, typer.Option(min=1, help="CPU threads of a backend that can use several (taichi)")]
+Threads = Annotated[int, typer.Option(min=1, help="CPU threads of taichi; with several, the last bits vary")]
 Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/SCENARIO")]
 WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
 Film = Annotated[float | None, typer.Option("--render-every", min=1e-6, help="simulated seconds between pictures, "

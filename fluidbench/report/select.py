@@ -52,7 +52,9 @@ def _findings(
     if best is None:
         return [f"No recommendation: {why}.", *chosen.notes]
     lines = [f"Recommended: {_words(best)}." + (f" But {why}." if why else "")]
-    lines.append(f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}")
+    lines.append(
+        f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}{best.run.target.options}"
+    )
     finer = [c for c in chosen.candidates if c.error <= best.error / 2]
     faster = [c for c in chosen.candidates if c.wall <= best.wall / 2]
     if finer:

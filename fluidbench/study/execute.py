@@ -36,9 +36,12 @@ class Finished:
         return self.record["verdict"] == "completed"
 
     @property
+    def target(self) -> Target:
+        return Target(self.record["device"], self.record["backend"], self.record.get("threads", 1))
+
+    @property
     def label(self) -> str:
-        target = Target(self.record["device"], self.record["backend"])
-        return f"{self.record['method']}{target.suffix}"
+        return f"{self.record['method']}{self.target.suffix}"
 
 
 @dataclass(frozen=True)

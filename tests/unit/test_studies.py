@@ -12,13 +12,17 @@ from fluidbench.library import load
 from fluidbench.solver import approximations, configure, get_solver, refusal
 from fluidbench.study.ablate import Change, changes, effect
 from fluidbench.study.case import Finding, cases
+from fluidbench.study.evidence import Evidence
 from fluidbench.study.execute import Finished
 from fluidbench.study.limits import bisect, block, block_limit, default_dt
 from fluidbench.study.select import assess, confidence, trust_of
 from fluidbench.study.stability import AXES, choose, measure_point, point_tasks, theory, varied
+from fluidbench.study.table1 import frameworks
 from fluidbench.study.validate import Trial
 from fluidbench.study.verdicts import (
     CONFIRMED,
+    DIFFERS,
+    HOLDS,
     OPEN,
     REFUTED,
     agreed,
@@ -186,3 +190,26 @@ def test_options_are_read_or_refused():
             budget_of(wrong)
     with pytest.raises(UserError, match="did you mean 'viscosity'"):
         choose(["viscocity"])
+
+
+def run_at(method, backend, pace, repeat):
+    cost = {"wall_per_simulated_s": pace * (1.0 + 0.001 * repeat), "wall_s": pace}
+    return Finished(
+        {"verdict": "completed", "method": method, "device": "cpu", "backend": backend, "repeat": repeat, "cost": cost},
+        Path("nowhere"), False,
+    )  # fmt: skip
+
+
+def paces(backend, **by_method):
+    return {m: [run_at(m, backend, pace, r) for r in range(2)] for m, pace in by_method.items()}
+
+
+def test_a_verdict_on_cost_is_the_same_in_both_backends_or_said_to_differ():
+    here = paces("warp", mpm=1.0, sph=10.0, pbd=4.0)
+    held = frameworks(Evidence(load("line_bead"), [], here, other=paces("taichi", mpm=2.0, sph=12.0, pbd=5.0)))
+    assert {c.verdict for c in held if c.row.endswith("cost at equal spacing")} == {HOLDS}
+    turned = frameworks(Evidence(load("line_bead"), [], here, other=paces("taichi", mpm=2.0, sph=3.0, pbd=9.0)))
+    verdicts = {c.method: c.verdict for c in turned if c.row.endswith("cost at equal spacing")}
+    assert verdicts == {"mpm": HOLDS, "sph": DIFFERS, "pbd": HOLDS}
+    alone = frameworks(Evidence(load("line_bead"), [], here))
+    assert {c.verdict for c in alone} == {OPEN}
