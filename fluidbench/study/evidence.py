@@ -25,7 +25,8 @@ LIMITS = Spacing("spacing", (0.5, 1.0), (0.5, 1.0), "of the scenario's")  # wher
 COST_CASES = ("dam_break", "elliptic_drop", "bead_area")  # cases that all methods can run, at several spacings
 DEAR = (
     "slump_cylinder", "collapse_threshold", "oldroyd_drop_impact", "point_source_current", "viscous_column_slip",
-    "self_weight_column", "bead_strand_shape", "slump_slip", "cantilever_sag", "rigid_rotation",
+    "self_weight_column", "bead_strand_shape", "slump_slip", "cantilever_sag", "rigid_rotation", "curing_bead_arrest",
+    "free_expansion", "buildability_rate", "stiffening_under_load",
 )  # fmt: skip
 """Cases that a quick study does not run: it takes their answers from the shipped table."""
 SPREAD = 2  # runs in the other backend: the fewest that have a spread
