@@ -295,12 +295,8 @@ class Neighbours:
     def update(self) -> None:
         """Enqueue the check of the lists and, on the device's own decision, their renewal."""
         pool = self.pool
-        wp.launch(
-            watch,
-            pool.size,
-            [pool.capacity, pool.count, pool.position, self.listed, self.half_skin2],
-            [self.outdated],
-            device=self.scene.device,
+        self.backend.launch(
+            watch, pool.size, [pool.capacity, pool.count, pool.position, self.listed, self.half_skin2], [self.outdated]
         )
         if self.scene.device.is_cpu:
             wp.capture_if(self.outdated, on_true=self._renew)
@@ -314,19 +310,18 @@ class Neighbours:
         self._fill()
 
     def _build(self) -> None:
-        pool, device = self.pool, self.scene.device
-        wp.launch(mark_worlds, pool.size, [pool.capacity, pool.worlds, pool.count], [self.group], device=device)
+        pool = self.pool
+        self.backend.launch(mark_worlds, pool.size, [pool.capacity, pool.worlds, pool.count], [self.group])
         self.grid.build(pool.position, self.reach, groups=self.group)
 
     def _fill(self) -> None:
-        pool, device = self.pool, self.scene.device
-        wp.launch(
+        pool = self.pool
+        self.backend.launch(
             fill_lists,
             pool.size,
             [self.grid.id, self.scene.box, self.group, pool.worlds, self.reach, self.limit, self.row, self.column,
              pool.position],
             [self.entries, self.number, self.listed, pool.fault, self.outdated],
-            device=device,
         )  # fmt: skip
 
     def footprint(self) -> dict[str, int]:
