@@ -6,8 +6,10 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..study.cells import Cell
 from ..study.evidence import Evidence
-from ..study.table1 import IN_BOTH, Cell, table1
+from ..study.frameworks import IN_BOTH
+from ..study.table1 import table1
 from ..study.verdicts import OPEN, RULES
 from .study import Report, Runs, anchor, record_link
 from .tables import Link, Table

@@ -4,32 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from statistics import mean, stdev
 from typing import Any
 
 from ..scenario import Scenario
 from ..solver import configure, get_solver
+from .cells import Cell, all_runs, figures, runs_of
 from .compare import lengths_of
 from .evidence import COST_CASES, METHODS, SHIPPED, Evidence
 from .execute import Finished
+from .frameworks import frameworks
 from .stability import varied
 from .validate import Trial
 from .verdicts import (
     APART,
     COLLAPSE,
     CONFIRMED,
-    DIFFERS,
     EFFECT,
     FEWEST,
     GOOD,
-    HOLDS,
     JUDGED,
     OPEN,
     POOR,
     REFUTED,
     agreed,
-    at_equal_error,
+    equal_error,
     placed,
     ranked,
     share_within,
@@ -42,23 +41,7 @@ CLASSES = {
 }
 VISCOSITIES, YIELDS = (1e-3, 1e3), (0.0, 1e4)  # ends of an axis: Pa s, Pa
 DEFORMATION = ("slump_cylinder", "self_weight_column", "cantilever_sag", "viscous_column_slip")
-IN_BOTH = "in both frameworks:"  # rows that ask a verdict on cost of the other backend, too
 COLLAPSING = ("collapse_threshold", "slump_slip")
-
-
-@dataclass
-class Cell:
-    """A row of the table: what the paper says of a method, what was measured, by which experiment, the verdict, and
-    the runs behind it."""
-
-    row: str
-    method: str
-    paper: str
-    measured: str
-    experiment: str
-    rule: str
-    verdict: str
-    runs: list[Finished] = field(default_factory=list)
 
 
 def table1(e: Evidence) -> list[Cell]:
@@ -71,10 +54,6 @@ def table1(e: Evidence) -> list[Cell]:
 def paradigm() -> list[Cell]:
     words = {"mpm": "hybrid particle-grid", "sph": "particles, mesh-free", "pbd": "particles, constraints"}
     return [Cell("paradigm", m, words[m], get_solver(m).paradigm, "none", "definition", OPEN) for m in words]
-
-
-def _runs_of(trials: Sequence[Trial]) -> list[Finished]:
-    return [run for t in trials for run in t.runs.values()]
 
 
 def _answers(trials: Sequence[Trial], methods: Sequence[str], physics: Sequence[str]) -> list[Trial]:
@@ -103,19 +82,9 @@ def fidelity(e: Evidence) -> list[Cell]:
                 share = passed / judged
                 low = word.startswith("plausible")
                 verdict = CONFIRMED if (share <= POOR if low else share >= GOOD) else REFUTED
-            runs = _runs_of(_answers(e.trials, [method], physics))
+            runs = runs_of(_answers(e.trials, [method], physics))
             cells.append(Cell(f"fidelity, {kind}", method, word, measured, "validate", "fidelity", verdict, runs))
     return cells
-
-
-def _figures(repeats: dict[str, list[Finished]], key: str) -> dict[str, list[float]]:
-    """A cost figure of every completed repeat; methods that never completed are missing."""
-    found = {m: [r.record["cost"][key] for r in runs if r.ok] for m, runs in repeats.items()}
-    return {m: values for m, values in found.items() if values}
-
-
-def _all(e: Evidence) -> list[Finished]:
-    return [run for runs in e.repeats.values() for run in runs]
 
 
 def stability(e: Evidence) -> list[Cell]:
@@ -125,7 +94,7 @@ def stability(e: Evidence) -> list[Cell]:
         "sph": ("low, smaller dt", "lowest"),
         "pbd": ("high, larger dt", "highest"),
     }
-    speed, dts = e.scenario.wave_speed, _figures(e.repeats, "mean_dt_s")
+    speed, dts = e.scenario.wave_speed, figures(e.repeats, "mean_dt_s")
     measured = {
         m: [r["dt_lump_s"] * speed / (r["value"] * e.scenario.spacing) for r in rows if r["verdict"] == "held"]
         for m, rows in e.limits.items()
@@ -144,7 +113,7 @@ def stability(e: Evidence) -> list[Cell]:
 
 def cost(e: Evidence) -> list[Cell]:
     words = {"mpm": ("mid-high", "upper"), "sph": ("high", "highest"), "pbd": ("low", "lowest")}
-    walls = _figures(e.repeats, "wall_per_simulated_s")
+    walls = figures(e.repeats, "wall_per_simulated_s")
     places = ranked(walls)
     enough = len(places) == 3 and min(map(len, walls.values())) > 1
     cells = []
@@ -157,20 +126,9 @@ def cost(e: Evidence) -> list[Cell]:
     for m, (word, place) in words.items():
         verdict, shares = equal_error(e.trials, m, place)
         measured = f"over the cheapest: {shares or 'no case that all three can run at several spacings'}"
-        runs = _runs_of([t for t in e.trials if t.case.name in COST_CASES and t.method == m])
+        runs = runs_of([t for t in e.trials if t.case.name in COST_CASES and t.method == m])
         cells.append(Cell("cost at equal error", m, word, measured, "validate, levels", "equal error", verdict, runs))
     return cells
-
-
-def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, str]:
-    """(verdict on a method's place, its times over the cheapest) at the error that all three reach."""
-    every = {name: at_equal_error([t for t in trials if t.case.name == name]) for name in COST_CASES}
-    equal = {name: costs for name, costs in every.items() if len(costs) == 3}
-    shares = ", ".join(f"{n}: x {costs[method] / min(costs.values()):.2g}" for n, costs in equal.items())
-    tops = [placed(ranked({k: [v] for k, v in costs.items()})[method], place) for costs in equal.values()]
-    if len(tops) < FEWEST:
-        return OPEN, shares
-    return CONFIRMED if tops.count(CONFIRMED) > len(tops) / 2 else REFUTED, shares
 
 
 def best_for(e: Evidence) -> list[Cell]:
@@ -182,25 +140,25 @@ def best_for(e: Evidence) -> list[Cell]:
         judged = sum(wins.values())
         verdict = OPEN if judged < FEWEST else CONFIRMED if wins.get(m, 0) > judged / 2 else REFUTED
         tally = ", ".join(f"{k} {n}" for k, n in sorted(wins.items(), key=lambda item: -item[1])) or "none"
-        runs = _runs_of(_answers(e.trials, METHODS, physics))
+        runs = runs_of(_answers(e.trials, METHODS, physics))
         cells.append(
             Cell("best for", m, word, f"cheapest within tolerance on: {tally}", "validate", "best", verdict, runs)
         )
-    walls = _figures(e.repeats, "wall_per_simulated_s")
+    walls = figures(e.repeats, "wall_per_simulated_s")
     paces = ", ".join(f"{k} {mean(v):.3g}" for k, v in walls.items())
     verdict = placed(ranked(walls)["pbd"], "lowest") if len(walls) == 3 else OPEN
     measured = f"at equal spacing, wall s / simulated s: {paces}"
-    return [*cells, Cell("best for", "pbd", "real-time previews", measured, "compare", "cost", verdict, _all(e))]
+    return [*cells, Cell("best for", "pbd", "real-time previews", measured, "compare", "cost", verdict, all_runs(e))]
 
 
 def limits(e: Evidence) -> list[Cell]:
     cells = []
-    sizes = _figures(e.repeats, "bytes_per_particle")
+    sizes = figures(e.repeats, "bytes_per_particle")
     if len(sizes) == 3:
         volume = e.scenario.spacing**3
         measured = ", ".join(f"{m} {v[0]:.0f} B ({v[0] / volume / 1e9:.3g} GB/m^3)" for m, v in sizes.items())
         verdict = placed(ranked(sizes)["mpm"], "highest")
-        cells.append(Cell("limits: memory", "mpm", "memory", measured, "compare", "cost", verdict, _all(e)))
+        cells.append(Cell("limits: memory", "mpm", "memory", measured, "compare", "cost", verdict, all_runs(e)))
     cells.append(grid_artifacts(e, "limits: grid artifacts", "grid artifacts"))
     for name, key, ends, unit in (("viscosity", "material.viscosity", VISCOSITIES, "Pa s"),
                                   ("yield stress", "material.yield_stress", YIELDS, "Pa")):  # fmt: skip
@@ -251,7 +209,7 @@ def physical_accuracy(e: Evidence) -> Cell:
         measured += f"; bead width [mm] over {name}: {shown}"
     verdict = OPEN if judged < FEWEST else CONFIRMED if passed <= POOR * judged else REFUTED
     runs = [r for sweep in (e.iterations, e.advances) for group in sweep.values() for r in group]
-    runs += _runs_of(_answers(e.trials, ["pbd"], every))
+    runs += runs_of(_answers(e.trials, ["pbd"], every))
     word = "low physical accuracy"
     return Cell("limits: accuracy", "pbd", word, measured, "validate, iterations, steps", "fidelity", verdict, runs)
 
@@ -263,17 +221,17 @@ def _widths(runs: Sequence[Finished]) -> list[float]:
 def claims(e: Evidence) -> list[Cell]:
     """The sentences of the paper's text."""
     cells = []
-    dts, walls = _figures(e.repeats, "mean_dt_s"), _figures(e.repeats, "wall_per_simulated_s")
+    dts, walls = figures(e.repeats, "mean_dt_s"), figures(e.repeats, "wall_per_simulated_s")
     if {"mpm", "sph"} <= set(dts) and len(walls) == 3:
         ratio = mean(dts["mpm"]) / mean(dts["sph"])
         cells.append(Cell(
             "claim", "sph", "needs prohibitively small steps in this setting", f"dt is 1 / {ratio:.2f} of MPM's",
-            "compare", "collapse", CONFIRMED if ratio >= COLLAPSE else REFUTED, _all(e),
+            "compare", "collapse", CONFIRMED if ratio >= COLLAPSE else REFUTED, all_runs(e),
         ))  # fmt: skip
         costs = ", ".join(f"{m} {mean(v):.3g}" for m, v in walls.items())
         cells.append(Cell(
             "claim", "sph", "would be the most expensive", f"wall s / simulated s: {costs}", "compare", "cost",
-            placed(ranked(walls)["sph"], "highest"), _all(e),
+            placed(ranked(walls)["sph"], "highest"), all_runs(e),
         ))  # fmt: skip
     cells.append(bead_width(e))
     cells.append(prediction(e, "cannot predict deformation under load", DEFORMATION))
@@ -289,7 +247,7 @@ def prediction(e: Evidence, word: str, names: Sequence[str]) -> Cell:
     measured = ", ".join(f"{t.case.name}: error {t.error:.2g} of {t.tolerance:g}" for t in own)
     measured += f" ({SHIPPED})" if any(t.note == SHIPPED for t in own) else ""
     verdict = OPEN if len(own) < FEWEST else CONFIRMED if len(missed) > len(own) / 2 else REFUTED
-    return Cell("claim", "pbd", word, measured or "not run", "validate", "prediction", verdict, _runs_of(own))
+    return Cell("claim", "pbd", word, measured or "not run", "validate", "prediction", verdict, runs_of(own))
 
 
 def bead_width(e: Evidence) -> Cell:
@@ -307,38 +265,3 @@ def bead_width(e: Evidence) -> Cell:
         lines.append(", ".join(f"{m} {1e3 * w:.1f} mm" for m, w in widths.items()) + f": off by {off:.0%}")
     measured = "; ".join(lines) or "a method did not lay a bead"
     return Cell("claim", "pbd", word, measured, "compare, two spacings", "prediction", agreed(verdicts), runs)
-
-
-def frameworks(e: Evidence) -> list[Cell]:
-    """Each verdict on cost once more: does it hold in the other backend, or was it the implementation's?"""
-    lines = (
-        ("cost at equal spacing", "mpm", "mid-high", "upper"), ("cost at equal spacing", "sph", "high", "highest"),
-        ("cost at equal spacing", "pbd", "low", "lowest"), ("claim", "sph", "would be the most expensive", "highest"),
-        ("best for", "pbd", "real-time previews", "lowest"),
-    )  # fmt: skip
-    both = [_figures(runs, "wall_per_simulated_s") for runs in (e.repeats, e.other)]
-    runs = _all(e) + [run for group in e.other.values() for run in group]
-    cells = []
-    for row, m, word, place in lines:
-        decided = all(len(walls) == 3 and min(map(len, walls.values())) > 1 for walls in both)
-        verdicts = [placed(ranked(walls)[m], place) for walls in both] if decided else []
-        costs = "; ".join(", ".join(f"{k} {mean(v):.3g}" for k, v in walls.items()) for walls in both if walls)
-        measured = f"here and in the other backend, wall s / simulated s: {costs}"
-        cells.append(_held(row, m, word, measured, "compare, both backends", verdicts, runs))
-    for m, word, place in (("mpm", "mid-high", "upper"), ("sph", "high", "highest"), ("pbd", "low", "lowest")):
-        found = [equal_error(trials, m, place) for trials in (e.trials, e.other_trials)]
-        verdicts = [verdict for verdict, _ in found] if OPEN not in {verdict for verdict, _ in found} else []
-        measured = "here and in the other backend, over the cheapest: " + "; ".join(s or "not run" for _, s in found)
-        runs_of = _runs_of([t for t in e.other_trials if t.method == m])
-        cells.append(_held("cost at equal error", m, word, measured, "validate, both backends", verdicts, runs_of))
-    why = "all known answers would be needed in the other backend"
-    return [*cells, *(_held("best for", c.method, c.paper, why, "none", [], []) for c in best_for(e)[:2])]
-
-
-def _held(
-    row: str, method: str, word: str, measured: str, experiment: str, verdicts: Sequence[str], runs: list[Finished]
-) -> Cell:
-    """Whether a verdict is the same in both backends; `verdicts` is empty where one of them has none."""
-    verdict = OPEN if not verdicts else HOLDS if len(set(verdicts)) == 1 else DIFFERS
-    measured = f"{' and '.join(verdicts) or 'not decided in both'}; {measured}"
-    return Cell(f"{IN_BOTH} {row}", method, word, measured, experiment, "frameworks", verdict, runs)

@@ -11,6 +11,7 @@ from statistics import mean, stdev
 
 import numpy as np
 
+from .evidence import COST_CASES
 from .validate import Trial
 
 CONFIRMED, REFUTED, OPEN = "confirmed", "refuted", "not decidable"
@@ -90,6 +91,17 @@ def at_equal_error(trials: Sequence[Trial]) -> dict[str, float]:
         return {}
     target = max(p[:, 0].min() for p in points.values())
     return {m: math.exp(_cost_at(target, p)) for m, p in points.items()}
+
+
+def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, str]:
+    """(verdict on a method's place, its times over the cheapest) at the error that all three reach."""
+    every = {name: at_equal_error([t for t in trials if t.case.name == name]) for name in COST_CASES}
+    equal = {name: costs for name, costs in every.items() if len(costs) == 3}
+    shares = ", ".join(f"{n}: x {costs[method] / min(costs.values()):.2g}" for n, costs in equal.items())
+    tops = [placed(ranked({k: [v] for k, v in costs.items()})[method], place) for costs in equal.values()]
+    if len(tops) < FEWEST:
+        return OPEN, shares
+    return CONFIRMED if tops.count(CONFIRMED) > len(tops) / 2 else REFUTED, shares
 
 
 def _cost_at(target: float, points: np.ndarray) -> float:

@@ -14,10 +14,10 @@ from fluidbench.study.ablate import Change, changes, effect
 from fluidbench.study.case import Finding, cases
 from fluidbench.study.evidence import Evidence
 from fluidbench.study.execute import Finished
+from fluidbench.study.frameworks import frameworks
 from fluidbench.study.limits import bisect, block, block_limit, default_dt
 from fluidbench.study.select import assess, confidence, trust_of
 from fluidbench.study.stability import AXES, choose, measure_point, point_tasks, theory, varied
-from fluidbench.study.table1 import frameworks
 from fluidbench.study.validate import Trial
 from fluidbench.study.verdicts import (
     CONFIRMED,

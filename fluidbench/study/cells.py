@@ -1,0 +1,39 @@
+"""A cell of the judged table, and what several rows take from the evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from .evidence import Evidence
+from .execute import Finished
+from .validate import Trial
+
+
+@dataclass
+class Cell:
+    """A row of the table: what the paper says of a method, what was measured, by which experiment, the verdict, and
+    the runs behind it."""
+
+    row: str
+    method: str
+    paper: str
+    measured: str
+    experiment: str
+    rule: str
+    verdict: str
+    runs: list[Finished] = field(default_factory=list)
+
+
+def runs_of(trials: Sequence[Trial]) -> list[Finished]:
+    return [run for t in trials for run in t.runs.values()]
+
+
+def figures(repeats: dict[str, list[Finished]], key: str) -> dict[str, list[float]]:
+    """A cost figure of every completed repeat; methods that never completed are missing."""
+    found = {m: [r.record["cost"][key] for r in runs if r.ok] for m, runs in repeats.items()}
+    return {m: values for m, values in found.items() if values}
+
+
+def all_runs(e: Evidence) -> list[Finished]:
+    return [run for runs in e.repeats.values() for run in runs]
