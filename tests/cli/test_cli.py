@@ -31,6 +31,7 @@ MISTAKES = [
     (["compare", "line_bead", "--backend", "warp,taichy"], "did you mean 'taichi'"),
     (["compare", "line_bead", "--backend", "warp,warp"], "names warp twice"),
     (["compare", "line_bead", "--backend", ","], "names no backend"),
+    (["run", "line_bead", "--threads", "4"], "--threads 4 is for taichi"),
     (["table2", "--pools", "298k"], "--pools takes whole numbers"),
     (["run", "line_bead", "--out", "/proc/nowhere"], "cannot write"),
     (["show", "line_bead", "--set", "material.density=-3"], "material.density"),
