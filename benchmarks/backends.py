@@ -1,7 +1,7 @@
 """Every method in both languages: throughput and cold compile time, each in a process of its own.
 
 A cylinder of paste slumps on a rough floor (the scenario column_slump, at the spacing that gives about the wanted
-number of particles). Prints the table of docs/benchmarks.md:
+number of particles). Prints the table of docs/backends.md:
 
     python benchmarks/backends.py --device cpu --particles 25000
     python benchmarks/backends.py --device cuda:0 --particles 300000

@@ -5,7 +5,7 @@ Functions over `axis` are unrolled: it is known when they are compiled.
 
 from fluidbench.scene import FRICTION, PERIODIC, STICK
 
-from ..taichi_bridge import ivec3, struct_of, ti, vec3, vec4
+from ..taichi_bridge import Ints, Quads, Vectors, ivec3, struct_of, ti, vec3, vec4
 from .grid import FAULT_BLOCKS, FIRST, Grid
 from .walls import CONTACT_BEGINS, CONTACT_ENDS
 
@@ -238,3 +238,29 @@ def contained(grid, x):
             skin = 1.0e-3 * grid.dx[axis]
             out[axis] = ti.math.clamp(x[axis], low + skin, high - skin)
     return out
+
+
+@ti.kernel
+def reset_blocks(table: Ints, block_of: Ints, active: Ints, lanes: int):
+    for slot in range(slots_in_use(active, block_of)):
+        table[block_of[slot]] = 0
+
+
+@ti.kernel
+def find_blocks(
+    grid: GridT, capacity: int, count: Ints, position: Vectors,
+    table: Ints, block_of: Ints, active: Ints, fault: Ints,
+):  # fmt: skip
+    known = slots_in_use(active, block_of)
+    for p in range(position.shape[0]):
+        world = p // capacity
+        if p - world * capacity < count[world]:
+            claim(grid, world, base_node(grid, position[p]), table, block_of, active, fault)
+    for slot in range(known, slots_in_use(active, block_of)):
+        table[block_of[slot]] = slot + 1
+
+
+@ti.kernel
+def clear_grid(active: Ints, lanes: int, raw: Quads):
+    for node in range(ti.min(active[0] * 64, raw.shape[0])):
+        raw[node] = vec4(0.0)

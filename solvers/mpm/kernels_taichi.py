@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 from fluidbench.particles import CARRIED, CLAMPED, FREE
 
-from .. import constitutive
+from ..flow_taichi import pressure, strained
 from ..smoothing import quadratic_spline
 from ..taichi_bridge import (
     Floats,
@@ -33,14 +33,17 @@ from .grid_taichi import (
     base_node,
     bounded,
     claim,
+    clear_grid,
     contact,
     contained,
+    find_blocks,
     folded,
     in_front,
     kind_near,
     near,
     near_any,
     node_at,
+    reset_blocks,
     seen_in_wall,
     share_inside,
     slots_in_use,
@@ -48,36 +51,8 @@ from .grid_taichi import (
 )
 from .kernels_warp import ANCHOR, ANCHORED, FAULT_STENCIL, Feedback
 
-pressure = taichi_func(constitutive.pressure)
-strain_and_flow = taichi_func(constitutive.strain_and_flow, constitutive.flow_stress)
 spline = taichi_func(quadratic_spline)
 FeedbackT = struct_of(Feedback)
-
-
-@ti.kernel
-def reset_blocks(table: Ints, block_of: Ints, active: Ints, lanes: int):
-    for slot in range(slots_in_use(active, block_of)):
-        table[block_of[slot]] = 0
-
-
-@ti.kernel
-def find_blocks(
-    grid: GridT, capacity: int, count: Ints, position: Vectors,
-    table: Ints, block_of: Ints, active: Ints, fault: Ints,
-):  # fmt: skip
-    known = slots_in_use(active, block_of)
-    for p in range(position.shape[0]):
-        world = p // capacity
-        if p - world * capacity < count[world]:
-            claim(grid, world, base_node(grid, position[p]), table, block_of, active, fault)
-    for slot in range(known, slots_in_use(active, block_of)):
-        table[block_of[slot]] = slot + 1
-
-
-@ti.kernel
-def clear_grid(active: Ints, lanes: int, raw: Quads):
-    for node in range(ti.min(active[0] * 64, raw.shape[0])):
-        raw[node] = vec4(0.0)
 
 
 @ti.func
@@ -100,17 +75,6 @@ def kirchhoff(phase, j, b, s, rate):
         symmetrical = 0.5 * (rate + rate.transpose())
         tau += (2.0 * ti.min(j, 1.0) * phase.viscosity) * (symmetrical - (rate.trace() / 3.0) * unit)
     return tau
-
-
-@ti.func
-def strained(phase, c, b, s, h):
-    """The elastic tensor after a step under the velocity gradient c: its diagonal, and xy, xz, yz."""
-    xx, yy, zz, xy, xz, yz = strain_and_flow(
-        c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2], b[0], b[1], b[2], s[0], s[1],
-        s[2], phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
-        phase.relaxation_rate, h,
-    )  # fmt: skip
-    return vec3(xx, yy, zz), vec3(xy, xz, yz)
 
 
 @ti.kernel
@@ -196,7 +160,7 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
                     j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
                     b, s = elastic_normal[p], elastic_shear[p]
                     if phase.shear_modulus > 0.0:
-                        b, s = strained(phase, c, b, s, h)
+                        b, s = strained(phase, phase.shear_modulus, c, b, s, h)
                         elastic_normal[p], elastic_shear[p] = b, s
                     volume_ratio[p] = j
                     tau = kirchhoff(phase, j, b, s, c)

@@ -16,7 +16,18 @@ from .. import constitutive
 from ..bind import rebound, warp_func
 from ..smoothing import quadratic_spline
 from ..vector_access import add_vec4, in_company, load_vec4, run_of
-from .grid import FIRST, Grid, activate_stencil, first_node, node_of, wrapped
+from .grid import (
+    FIRST,
+    Grid,
+    activate_stencil,
+    clear_grid,
+    find_blocks,
+    first_node,
+    node_of,
+    node_parts,
+    reset_blocks,
+    slots_of,
+)
 from .walls import flipped, folded, grip, mirror, near_wall, plane_share, unbound, wall_kind, wall_velocity
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -30,67 +41,6 @@ FAULT_STENCIL = 2
 # they share: a beam falls slowly off it.
 ANCHOR = wp.constant(1.0e4)
 ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
-
-
-@wp.kernel
-def reset_blocks(table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), lanes: int):
-    """Forget all blocks."""
-    t = wp.tid()
-    while t < wp.min(active[0], block_of.shape[0]):
-        table[block_of[t]] = 0
-        t += lanes
-
-
-@wp.kernel
-def find_blocks(
-    grid: Grid, capacity: int, count: wp.array(dtype=int), position: wp.array(dtype=wp.vec3),
-    # outputs
-    table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), fault: wp.array(dtype=int),
-):  # fmt: skip
-    """Activate the blocks around every particle."""
-    p = wp.tid()
-    world = p / capacity
-    if p - world * capacity < count[world]:
-        activate_stencil(grid, world, first_node(grid, position[p]), table, block_of, active, fault)
-
-
-@wp.kernel
-def clear_grid(active: wp.array(dtype=int), lanes: int, raw: wp.array(dtype=wp.vec4)):
-    """Empty the nodes of all active blocks."""
-    t = wp.tid()
-    n = wp.min(active[0] * 64, raw.shape[0])
-    while t < n:
-        raw[t] = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        t += lanes
-
-
-@wp.func
-def node_parts(grid: Grid, base: wp.vec3i):
-    """Per axis the block and in-block contributions to the address of the three stencil nodes."""
-    bx, by, bz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
-    lx, ly, lz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
-    for o in range(3):
-        i = wrapped(base[0] + o, grid.first[0], grid.wrap[0])
-        j = wrapped(base[1] + o, grid.first[1], grid.wrap[1])
-        k = wrapped(base[2] + o, grid.first[2], grid.wrap[2])
-        bx[o] = (i >> 2) * grid.blocks[1] * grid.blocks[2]
-        by[o] = (j >> 2) * grid.blocks[2]
-        bz[o] = k >> 2
-        lx[o] = (i & 3) << 4
-        ly[o] = (j & 3) << 2
-        lz[o] = k & 3
-    return bx, by, bz, lx, ly, lz
-
-
-@wp.func
-def slots_of(table: wp.array(dtype=int), start: int, bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i):
-    """Slots of the (at most) eight blocks of a stencil, -1 where there is none; z varies fastest."""
-    return (
-        table[start + bx[0] + by[0] + bz[0]] - 1, table[start + bx[0] + by[0] + bz[2]] - 1,
-        table[start + bx[0] + by[2] + bz[0]] - 1, table[start + bx[0] + by[2] + bz[2]] - 1,
-        table[start + bx[2] + by[0] + bz[0]] - 1, table[start + bx[2] + by[0] + bz[2]] - 1,
-        table[start + bx[2] + by[2] + bz[0]] - 1, table[start + bx[2] + by[2] + bz[2]] - 1,
-    )  # fmt: skip
 
 
 @wp.func

@@ -228,6 +228,9 @@ def yield_bonds(
             bonds.rest[at] = wp.clamp(bonds.rest[at], length / (1.0 + limit), length / wp.max(1.0 - limit, 0.1))
 
 
+PASSES = SimpleNamespace(awaken=awaken, bind=bind, stretch=stretch, yield_bonds=yield_bonds)
+
+
 class Network:
     """The bonds of a pool: what is allocated for them and the passes that use them."""
 

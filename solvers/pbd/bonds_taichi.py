@@ -1,5 +1,7 @@
 """Bonds of solids in PBD, in Taichi: the passes of bonds.py with the same arguments, written anew."""
 
+from types import SimpleNamespace
+
 from fluidbench.particles import CARRIED, CLAMPED, FREE
 from fluidbench.scene import PERIODIC, SLIP, STICK
 
@@ -154,3 +156,6 @@ def yield_bonds(
                 length = way_between(box, position[i], position[j], partner[at] >> INDEX_BITS).norm()
                 longest = length / ti.max(1.0 - strain, 0.1)
                 rest[at] = ti.min(ti.max(rest[at], length / (1.0 + strain)), longest)
+
+
+PASSES = SimpleNamespace(awaken=awaken, bind=bind, stretch=stretch, yield_bonds=yield_bonds)

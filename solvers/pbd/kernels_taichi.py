@@ -6,8 +6,8 @@ from types import SimpleNamespace
 from fluidbench.particles import CARRIED, FREE
 from fluidbench.scene import FRICTION, PERIODIC, STICK
 
-from .. import constitutive
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
+from ..flow_taichi import strained
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky, spiky_slope
@@ -28,13 +28,12 @@ from ..taichi_bridge import (
     vec3,
 )
 from . import laws
-from .bonds_taichi import awaken, bind, bonded, stretch, yield_bonds
+from .bonds_taichi import bonded
 from .kernels_warp import SLACK, SLACK_SOLID, Numbers
 
 kernel = taichi_func(poly6)
 summed = taichi_func(spiky)
 gradient = taichi_func(spiky_slope)
-strain_and_flow = taichi_func(constitutive.strain_and_flow, constitutive.flow_stress)
 smoothing_weight = taichi_func(laws.smoothing_weight, laws.largest_viscosity)
 conveyed_modulus = taichi_func(laws.conveyed_modulus, laws.largest_modulus)
 NumbersT = struct_of(Numbers)
@@ -178,12 +177,7 @@ def strain(
                 modulus = conveyed_modulus(phase.shear_modulus, num.stiffness, rest, num.spacing, dt[world])
                 b, s = elastic_normal[i], elastic_shear[i]
                 if held[i] != CARRIED:
-                    xx, yy, zz, xy, xz, yz = strain_and_flow(
-                        l[0, 0], l[0, 1], l[0, 2], l[1, 0], l[1, 1], l[1, 2], l[2, 0], l[2, 1], l[2, 2], b[0], b[1],
-                        b[2], s[0], s[1], s[2], modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
-                        phase.relaxation_rate, dt[world],
-                    )  # fmt: skip
-                    b, s = vec3(xx, yy, zz), vec3(xy, xz, yz)
+                    b, s = strained(phase, modulus, l, b, s, dt[world])
                     elastic_normal[i], elastic_shear[i] = b, s
                 carried = elastic_stress(modulus, b, s, 0.0) @ correction
             stress[i] = carried
@@ -281,5 +275,5 @@ def rub(
 
 PASSES = SimpleNamespace(
     predict=predict, multipliers=multipliers, correct=correct, apply=apply, velocities=velocities, strain=strain,
-    pull=pull, shear=shear, rub=rub, awaken=awaken, bind=bind, stretch=stretch, yield_bonds=yield_bonds,
+    pull=pull, shear=shear, rub=rub,
 )  # fmt: skip

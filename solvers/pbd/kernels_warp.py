@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.particles import CARRIED
-from fluidbench.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
+from fluidbench.scene import Box, Force, Phase, force_at
 
 from .. import constitutive
 from ..aging import rest_density
@@ -20,7 +20,8 @@ from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, image_position, image_velocity
 from ..smoothing import poly6, spiky, spiky_slope
 from . import laws
-from .bonds import awaken, bind, bonded, stretch, yield_bonds
+from .bonds import bonded
+from .walls import pushed, rub
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -49,16 +50,6 @@ class Numbers:
     sweeps: int  # shear sweeps per substep
     calm: float  # share of the approach of neighbours that is damped in a substep, in pastes [-]
     stiffness: float  # largest shear modulus that one Jacobi step conveys, over rho (d / dt)^2 [-]
-
-
-@wp.func
-def pushed(box: Box, free: wp.vec3, inside: wp.vec3):
-    """How far walls have moved a particle back inside; a periodic wrap is no motion."""
-    back = inside - free
-    for axis in range(3):
-        if box.lower_kind[axis] == PERIODIC:
-            back[axis] = 0.0
-    return back
 
 
 @wp.kernel
@@ -320,47 +311,7 @@ def shear(
         smoothed[i] = out
 
 
-@wp.func
-def rubbing(kind: int, gap: float, spacing: float, solid: bool):
-    """Whether a particle this far from a face rubs on it: stick walls hold the viscous by its images, solids here."""
-    return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
-
-
-@wp.kernel
-def rub(
-    box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
-    spacing: float, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
-    position: wp.array(dtype=wp.vec3),
-    # outputs
-    velocity: wp.array(dtype=wp.vec3),
-):  # fmt: skip
-    """Particles touching a friction wall lose tangential speed by Coulomb's law; solids on a stick wall all of it."""
-    i = wp.tid()
-    world = i / capacity
-    if i - world * capacity < count[world] and held[i] == 0:
-        v = velocity[i]
-        x = position[i]
-        solid = bonded(phases[world, phase_of[i]])
-        for axis in range(3):
-            kind, friction = box.lower_kind[axis], box.lower_friction[axis]
-            touching = rubbing(kind, x[axis] - box.lower[axis], spacing, solid)
-            if rubbing(box.upper_kind[axis], box.upper[axis] - x[axis], spacing, solid):
-                kind, friction = box.upper_kind[axis], box.upper_friction[axis]
-                touching = True
-            if touching:
-                normal = v[axis]
-                slide = v
-                slide[axis] = 0.0
-                speed = wp.length(slide)
-                grip = speed
-                if kind == FRICTION:
-                    grip = wp.min(friction * wp.abs(force_at(force[world], x)[axis]) * dt[world], speed)
-                v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
-                v[axis] = normal
-        velocity[i] = v
-
-
 PASSES = SimpleNamespace(
     predict=predict, multipliers=multipliers, correct=correct, apply=apply, velocities=velocities, strain=strain,
-    pull=pull, shear=shear, rub=rub, awaken=awaken, bind=bind, stretch=stretch, yield_bonds=yield_bonds,
+    pull=pull, shear=shear, rub=rub,
 )  # fmt: skip

@@ -149,12 +149,13 @@ class SolverPBD(Solver):
         self.order = CellOrder(scene, pool, self.num.support)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
-        """The passes in a backend's language."""
+        """The passes in a backend's language, those of bonds where the scene has any."""
+        fluid, solid = kernels.PASSES, bonds.PASSES
         if backend == "taichi":
-            from . import kernels_taichi
+            from . import bonds_taichi, kernels_taichi
 
-            return kernels_taichi.PASSES
-        return kernels.PASSES
+            fluid, solid = kernels_taichi.PASSES, bonds_taichi.PASSES
+        return SimpleNamespace(**vars(fluid), **(vars(solid) if bonds.needed(self.scene) else {}))
 
     def refresh(self) -> None:
         self.neighbours.refresh()

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 from fluidbench.particles import CARRIED, FREE
 from fluidbench.scene import FRICTION, PERIODIC
 
-from .. import constitutive
 from ..aging import DISORDER
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
+from ..flow_taichi import pressure, strained
 from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET
 from ..neighbours_taichi import (
     BoxT,
@@ -41,8 +41,6 @@ from ..taichi_bridge import (
 )
 from .kernels_warp import FLOOR, WHOLE, Smoothing
 
-pressure = taichi_func(constitutive.pressure)
-strain_and_flow = taichi_func(constitutive.strain_and_flow, constitutive.flow_stress)
 kernel = taichi_func(wendland)
 slope = taichi_func(wendland_slope)
 SmoothingT = struct_of(Smoothing)
@@ -169,13 +167,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 if ti.static(strength):
                     b, s = elastic_normal[i], elastic_shear[i]
                     if held[i] != CARRIED:
-                        xx, yy, zz, xy, xz, yz = strain_and_flow(
-                            gradient[0, 0], gradient[0, 1], gradient[0, 2], gradient[1, 0], gradient[1, 1],
-                            gradient[1, 2], gradient[2, 0], gradient[2, 1], gradient[2, 2], b[0], b[1], b[2], s[0],
-                            s[1], s[2], phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity,
-                            phase.flow_index, phase.relaxation_rate, h,
-                        )  # fmt: skip
-                        b, s = vec3(xx, yy, zz), vec3(xy, xz, yz)
+                        b, s = strained(phase, phase.shear_modulus, gradient, b, s, h)
                         elastic_normal[i], elastic_shear[i] = b, s
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     stress[i] = scale * (cauchy @ correction)

@@ -2,6 +2,7 @@
 
 import json
 
+import imageio.v2 as imageio
 import numpy as np
 import pytest
 
@@ -38,8 +39,6 @@ def test_pictures_are_taken_beside_the_run(tower):
 
 
 def test_a_run_is_rendered_filmed_and_exported(tower):
-    pytest.importorskip("pyvista")
-    imageio = pytest.importorskip("imageio.v2")
     _, folder = tower
     done = fluidbench("render", str(folder), "--no-turntable", "--film", "--export", "--colour", "stress")
     assert done.returncode == 0, done.stdout + done.stderr

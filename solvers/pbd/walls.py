@@ -1,0 +1,59 @@
+"""Walls of PBD beyond mirror images: how far they push, and how they rub."""
+
+import warp as wp
+
+from fluidbench.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
+
+from .bonds import bonded
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+
+@wp.func
+def pushed(box: Box, free: wp.vec3, inside: wp.vec3):
+    """How far walls have moved a particle back inside; a periodic wrap is no motion."""
+    back = inside - free
+    for axis in range(3):
+        if box.lower_kind[axis] == PERIODIC:
+            back[axis] = 0.0
+    return back
+
+
+@wp.func
+def rubbing(kind: int, gap: float, spacing: float, solid: bool):
+    """Whether a particle this far from a face rubs on it: stick walls hold the viscous by its images, solids here."""
+    return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
+
+
+@wp.kernel
+def rub(
+    box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
+    spacing: float, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
+    position: wp.array(dtype=wp.vec3),
+    # outputs
+    velocity: wp.array(dtype=wp.vec3),
+):  # fmt: skip
+    """Particles touching a friction wall lose tangential speed by Coulomb's law; solids on a stick wall all of it."""
+    i = wp.tid()
+    world = i / capacity
+    if i - world * capacity < count[world] and held[i] == 0:
+        v = velocity[i]
+        x = position[i]
+        solid = bonded(phases[world, phase_of[i]])
+        for axis in range(3):
+            kind, friction = box.lower_kind[axis], box.lower_friction[axis]
+            touching = rubbing(kind, x[axis] - box.lower[axis], spacing, solid)
+            if rubbing(box.upper_kind[axis], box.upper[axis] - x[axis], spacing, solid):
+                kind, friction = box.upper_kind[axis], box.upper_friction[axis]
+                touching = True
+            if touching:
+                normal = v[axis]
+                slide = v
+                slide[axis] = 0.0
+                speed = wp.length(slide)
+                grip = speed
+                if kind == FRICTION:
+                    grip = wp.min(friction * wp.abs(force_at(force[world], x)[axis]) * dt[world], speed)
+                v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
+                v[axis] = normal
+        velocity[i] = v
