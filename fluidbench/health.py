@@ -1,16 +1,21 @@
-"""Is the run still sound? Non-finite state, runaway speed and unfed energy, found on the device."""
+"""Is the run still sound? Broken state, runaway speed and unfed energy, found on the device.
+
+Methods test each motion before walls act on it, and each state that they advance (FAULT_ASTRAY, FAULT_STATE of the
+pool's fault bits): a clamp is never all that stands between a blow-up and a result. `audit` tests everything that
+particles carry, once a tick; `read` judges the whole.
+"""
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
 
-from .particles import Pool
-from .scene import Force, Scene, force_potential
+from .particles import FAULT_ASTRAY, FAULT_STATE, Pool
+from .scene import Box, Force, Scene, force_potential, out_of_reach
 
 wp.set_module_options({"enable_backward": False})
-SPEED_FACTOR = 3.0  # matter faster than this many times (wave speed + reference speed) is no solution
 ENERGY_FACTOR = 2.0  # kinetic energy beyond this many times what was ever supplied comes from the method
 
 
@@ -19,7 +24,7 @@ def inspect(
     lanes: int, capacity: int, count: wp.array(dtype=int), position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), force: wp.array(dtype=Force),
     # outputs
-    top_speed: wp.array(dtype=float), broken: wp.array(dtype=int), energy: wp.array2d(dtype=wp.float64),
+    top_speed: wp.array(dtype=float), nonfinite: wp.array(dtype=int), energy: wp.array2d(dtype=wp.float64),
 ):  # fmt: skip
     """Per world: largest speed, number of non-finite particles, kinetic and potential energy."""
     world, lane = wp.tid()
@@ -41,10 +46,53 @@ def inspect(
     if fastest > 0.0:
         wp.atomic_max(top_speed, world, wp.sqrt(fastest))
     if bad > 0:
-        wp.atomic_add(broken, world, bad)
+        wp.atomic_add(nonfinite, world, bad)
     if kinetic != wp.float64(0.0) or potential != wp.float64(0.0):
         wp.atomic_add(energy, world, 0, kinetic)
         wp.atomic_add(energy, world, 1, potential)
+
+
+@wp.kernel
+def audit_values(
+    values: wp.array(dtype=float), width: int, low: float, high: float, capacity: int, count: wp.array(dtype=int),
+    # outputs
+    fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Mark a field of which any number, of `width` a particle, lies outside low .. high or is none."""
+    i = wp.tid()
+    if i % capacity < count[i / capacity]:
+        for k in range(width):
+            x = values[i * width + k]
+            if not (x >= low and x <= high):
+                wp.atomic_or(fault, 0, FAULT_STATE)
+
+
+@wp.kernel
+def audit_integers(
+    low: int, high: int, capacity: int, count: wp.array(dtype=int),
+    # outputs
+    values: wp.array(dtype=int), fault: wp.array(dtype=int),
+):  # fmt: skip
+    """The same for whole numbers; what is broken becomes `low`, lest it be used as an address."""
+    i = wp.tid()
+    if i % capacity < count[i / capacity]:
+        if values[i] < low or values[i] > high:
+            wp.atomic_or(fault, 0, FAULT_STATE)
+            values[i] = low
+
+
+@wp.kernel
+def audit_positions(
+    box: Box, capacity: int, count: wp.array(dtype=int),
+    # outputs
+    position: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
+):  # fmt: skip
+    """Mark particles that are nowhere, and put them in the middle: positions become addresses in the passes."""
+    i = wp.tid()
+    if i % capacity < count[i / capacity]:
+        if out_of_reach(position[i], box.lower, box.upper, box.reach):
+            wp.atomic_or(fault, 0, FAULT_ASTRAY)
+            position[i] = 0.5 * (box.lower + box.upper)
 
 
 @dataclass(frozen=True)
@@ -62,11 +110,11 @@ class Health:
 
     def __init__(self, scene: Scene, pool: Pool) -> None:
         self.scene, self.pool = scene, pool
-        self.limit = SPEED_FACTOR * (scene.top_wave_speed + scene.scenario.reference_speed)
+        self._audit: Any = None
         self.lanes = min(scene.lanes, 4096)
         with wp.ScopedDevice(scene.device):
             self.top_speed = wp.zeros(pool.worlds, dtype=float)
-            self.broken = wp.zeros(pool.worlds, dtype=int)
+            self.nonfinite = wp.zeros(pool.worlds, dtype=int)
             self.energy = wp.zeros((pool.worlds, 2), dtype=wp.float64)
 
     def _mass_energy(self) -> float:
@@ -78,16 +126,48 @@ class Health:
         pressed = 0.05 * self.scene.top_wave_speed**2 if crowded else 0.0  # spawned children lie over each other
         return 0.5 * s.reference_speed**2 + float(reach) + pressed
 
+    def audit(self) -> None:
+        """Enqueue the test of every field of the pool against its range; it marks the pool's fault bits."""
+        if self._audit is None:
+            with wp.ScopedCapture(device=self.scene.device) as capture:
+                self._launch_audit()
+            self._audit = capture.graph
+        wp.capture_launch(self._audit)
+
+    def _launch_audit(self) -> None:
+        pool, device = self.pool, self.scene.device
+        active = [pool.capacity, pool.count]
+        for name, array in pool.fields.items():
+            low, high = pool.ranges[name]
+            if name == "position":
+                wp.launch(audit_positions, pool.size, [self.scene.box, *active], [array, pool.fault], device=device)
+            elif array.dtype is wp.int32:
+                bounds = [int(max(low, -(2**31))), int(min(high, 2**31 - 1))]
+                wp.launch(audit_integers, pool.size, [*bounds, *active], [array, pool.fault], device=device)
+            else:
+                width = wp.types.type_size_in_bytes(array.dtype) // 4
+                flat = wp.array(ptr=array.ptr, dtype=float, shape=width * pool.size, device=device)
+                wp.launch(audit_values, pool.size, [flat, width, low, high, *active], [pool.fault], device=device)
+
+    def broken(self) -> str | None:
+        """What a fault bit says of a run that has blown up; synchronises with the device."""
+        bits = int(self.pool.fault.numpy()[0])
+        if bits & FAULT_ASTRAY:
+            return f"a particle was thrown out of the domain, or faster than {self.scene.top_speed:.3g} m/s"
+        if bits & FAULT_STATE:
+            return "a particle's state is not finite, or beyond that of any matter"
+        return None
+
     def read(self) -> Vital:
         """Inspect all worlds; synchronises with the device."""
-        for array in (self.top_speed, self.broken, self.energy):
+        for array in (self.top_speed, self.nonfinite, self.energy):
             array.zero_()
         pool, scene = self.pool, self.scene
         wp.launch(
             inspect,
             (pool.worlds, self.lanes),
             [self.lanes, pool.capacity, pool.count, pool.position, pool.velocity, pool.mass, scene.force],
-            [self.top_speed, self.broken, self.energy],
+            [self.top_speed, self.nonfinite, self.energy],
             device=scene.device,
         )
         speed = float(self.top_speed.numpy().max())
@@ -95,11 +175,14 @@ class Health:
         return Vital(speed, float(kinetic), float(potential), self._complaint(speed, float(kinetic)))
 
     def _complaint(self, speed: float, kinetic: float) -> str | None:
-        bad = int(self.broken.numpy().sum())
+        bad = int(self.nonfinite.numpy().sum())
         if bad:
             return f"{bad} particles have a non-finite position or velocity"
-        if not math.isfinite(speed) or speed > self.limit:
-            return f"a particle moves at {speed:.3g} m/s; more than {self.limit:.3g} m/s cannot come from the scenario"
+        limit = self.scene.top_speed
+        if not math.isfinite(speed) or speed > limit:
+            return f"a particle moves at {speed:.3g} m/s; more than {limit:.3g} m/s cannot come from the scenario"
+        if broken := self.broken():
+            return broken
         mass = sum(
             n * s.material.density * s.spacing**3 for n, s in zip(self.pool.counts, self.scene.scenarios, strict=True)
         )

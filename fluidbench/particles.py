@@ -12,6 +12,8 @@ wp.set_module_options({"enable_backward": False})
 MAX_SLOTS = 2**26  # neighbour lists keep 26 bits for an index
 
 FREE, CARRIED, CLAMPED = wp.constant(0), wp.constant(1), wp.constant(2)
+FAULT_ASTRAY, FAULT_STATE = wp.constant(1024), wp.constant(2048)  # bits of Pool.fault: the run has blown up
+MOST = 1.0e18  # beyond it a number's square is no float32
 
 CORE = {
     "position": wp.vec3,  # [m]
@@ -52,18 +54,36 @@ class Pool:
         self.counts = [0] * self.worlds
         self.stale = True  # set whenever particles appear or move otherwise than by a substep
         self.fields: dict[str, wp.array] = {}
+        self.ranges: dict[str, tuple[float, float]] = {}
         with wp.ScopedDevice(scene.device):
             self.count = wp.zeros(self.worlds, dtype=int)
             self.fault = wp.zeros(1, dtype=int)  # bits set by kernels; Solver.faults says what they mean
         for name, dtype in CORE.items():
-            self.add_field(name, dtype)
+            self.add_field(name, dtype, within=self._core_range(name))
 
-    def add_field(self, name: str, dtype: Any, initial: Any = None) -> wp.array:
-        """A per-particle array of this dtype, zero or `initial` everywhere."""
+    def _core_range(self, name: str) -> tuple[float, float]:
+        """What a core field may hold: a particle stands for a volume near spacing^3, expanded at most."""
+        scenarios = self.scene.scenarios
+        ratio = max(1.0 if (e := s.material.expansion) is None else e.ratio for s in scenarios)
+        volume = (1e-6 * self.scene.spacing**3, 1e3 * ratio * self.scene.spacing**3)
+        densities = [s.material.density for s in scenarios]
+        return {
+            "mass": (volume[0] * min(densities) / ratio, volume[1] * max(densities)),
+            "volume": volume,
+            "phase": (0, self.scene.levels - 1),
+            "held": (0, 2),
+            "birth_time": (0.0, 2.0 * self.scene.scenario.duration),
+        }.get(name, (-MOST, MOST))
+
+    def add_field(
+        self, name: str, dtype: Any, initial: Any = None, within: tuple[float, float] = (-MOST, MOST)
+    ) -> wp.array:
+        """A per-particle array of this dtype, zero or `initial` everywhere. A component beyond the range `within` is no
+        state of matter: health finds it, and the run has diverged."""
         array = wp.zeros(self.size, dtype=dtype, device=self.scene.device)
         if initial is not None:
             array.fill_(initial)
-        self.fields[name] = array
+        self.fields[name], self.ranges[name] = array, within
         return array
 
     def __getattr__(self, name: str) -> wp.array:

@@ -15,6 +15,8 @@ from .scenario import Friction, Scenario
 
 SLIP, STICK, PERIODIC, FRICTION = 0, 1, 2, 3
 NEVER_YIELDS = wp.constant(1.0e30)
+SPEED_FACTOR = 3.0  # matter faster than this many times (wave speed + reference speed) is no solution
+REACH = 8.0  # spacings beyond a wall; at the speeds above, steps within their bounds lead 2 to 6 beyond it
 
 
 @wp.struct
@@ -45,6 +47,8 @@ class Box:
     upper_kind: wp.vec3i
     lower_friction: wp.vec3
     upper_friction: wp.vec3
+    reach: wp.vec3  # farther than this beyond a face no step of sound motion leads [m]
+    top_speed: float  # faster than this nothing moves that comes from the scenario [m/s]
 
 
 @wp.struct
@@ -68,6 +72,22 @@ def force_potential(force: Force, x: wp.vec3):
 
 
 @wp.func
+def out_of_reach(free: wp.vec3, lower: wp.vec3, upper: wp.vec3, reach: wp.vec3):
+    """Whether a step leads, before any wall acts, to where no sound motion does; non-finite positions are nowhere."""
+    astray = bool(False)
+    for axis in range(3):
+        if not (free[axis] >= lower[axis] - reach[axis] and free[axis] <= upper[axis] + reach[axis]):
+            astray = True
+    return astray
+
+
+@wp.func
+def too_fast(v: wp.vec3, top_speed: float):
+    """Whether a velocity cannot come from the scenario, or is not finite."""
+    return not (wp.length_sq(v) <= top_speed * top_speed)
+
+
+@wp.func
 def is_solid(phase: Phase):
     """Whether the material never flows (see Material.is_solid): nothing may relax its shape or volume."""
     return phase.shear_modulus > 0.0 and phase.yield_stress >= phase.shear_modulus and phase.relaxation_rate == 0.0
@@ -88,7 +108,9 @@ class Scene:
         self.sound_speed = max(s.liquid_sound_speed for s in self.scenarios)
         self.wave_speed = max(s.wave_speed for s in self.scenarios)
         self.top_wave_speed = max(s.top_wave_speed for s in self.scenarios)
+        self.top_speed = SPEED_FACTOR * (self.top_wave_speed + self.scenario.reference_speed)
         self.box = box_of(self.scenario)
+        self.box.top_speed = self.top_speed
         self._dt = math.nan
         with wp.ScopedDevice(self.device):
             self.dt = wp.zeros(self.worlds, dtype=float)
@@ -212,4 +234,6 @@ def box_of(scenario: Scenario) -> Box:
     box.lower, box.upper = wp.vec3(*scenario.domain.lower), wp.vec3(*scenario.domain.upper)
     box.lower_kind, box.upper_kind = wp.vec3i(*kinds[0::2]), wp.vec3i(*kinds[1::2])
     box.lower_friction, box.upper_friction = wp.vec3(*friction[0::2]), wp.vec3(*friction[1::2])
+    size = np.asarray(scenario.domain.upper) - np.asarray(scenario.domain.lower)
+    box.reach = wp.vec3(*np.minimum(REACH * scenario.spacing, size))
     return box

@@ -119,6 +119,7 @@ class Simulation:
 
     def advance(self) -> Plan:
         """One tick: feed, plan, and run its substeps."""
+        self.health.audit()
         with self.process_launches:
             self._age()
         if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
@@ -144,6 +145,7 @@ class Simulation:
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
+        self.health.audit()
         self._refresh()
         self.scene.set_dt(dt)
         self._run(substeps)
@@ -241,9 +243,15 @@ class Simulation:
             observe(self, self.look())
         while self.done < self.ticks and outcome.verdict is Verdict.COMPLETED:
             self._tick(outcome, every, observe, wall_limit)
-        outcome.time = self.now
-        outcome.ticks = self.done
+        self._conclude(outcome)
         return outcome
+
+    def _conclude(self, outcome: Outcome) -> None:
+        """What is carried to the end is tested like what is carried on."""
+        outcome.time, outcome.ticks = self.now, self.done
+        self.health.audit()
+        if outcome.verdict is Verdict.COMPLETED and (broken := self.health.broken()):
+            outcome.verdict, outcome.reason = Verdict.DIVERGED, f"at t = {self.now:.4g} s {broken}"
 
     def _tick(self, outcome: Outcome, every: int, observe, wall_limit: float | None) -> None:
         wall, cpu = time.perf_counter(), time.process_time()

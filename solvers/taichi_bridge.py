@@ -100,6 +100,30 @@ def is_solid(phase):
 
 
 @ti.func
+def beyond(x, limit):
+    """Whether |x| exceeds a positive limit, or is not a number: by its bits, since Taichi's comparisons of floats assume
+    that there are none that are not numbers."""
+    return (ti.bit_cast(ti.cast(x, ti.f32), ti.i32) & 0x7FFFFFFF) > ti.bit_cast(ti.cast(limit, ti.f32), ti.i32)
+
+
+@ti.func
+def out_of_reach(box, free):
+    """Whether a step leads, before any wall acts, to where no sound motion does."""
+    astray = False
+    for axis in ti.static(range(3)):
+        middle = 0.5 * (box.lower[axis] + box.upper[axis])
+        if beyond(free[axis] - middle, 0.5 * (box.upper[axis] - box.lower[axis]) + box.reach[axis]):
+            astray = True
+    return astray
+
+
+@ti.func
+def too_fast(v, top_speed):
+    """Whether a velocity cannot come from the scenario."""
+    return beyond(v.norm_sqr(), top_speed * top_speed)
+
+
+@ti.func
 def rest_density(mass: ti.template(), volume: ti.template(), i):
     """Of a particle that may have grown [kg/m^3]."""
     return mass[i] / volume[i]

@@ -95,7 +95,7 @@ def block_limit(
         for _ in range(STEPS // LOOKS):
             sim.march(dt, LOOKS)
             energy = sim.look().kinetic
-            if not energy < GROWTH * start:
+            if sim.health.broken() or not energy < GROWTH * start:
                 return False
         return True
 

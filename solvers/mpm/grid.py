@@ -36,6 +36,8 @@ class Grid:
     upper_friction: wp.vec3
     lower: wp.vec3  # walls [m]
     upper: wp.vec3
+    reach: wp.vec3  # as in scene.Box
+    top_speed: float
 
 
 def cells_of(domain: Domain, wanted: float) -> tuple[np.ndarray, np.ndarray]:
@@ -62,7 +64,8 @@ def grid_of(scene: Scene, wanted: float) -> Grid:
     grid.blocks_per_world = int(np.prod(blocks))
     for name in ("lower_kind", "upper_kind", "lower_friction", "upper_friction"):
         setattr(grid, name, getattr(scene.box, name))
-    grid.lower, grid.upper = wp.vec3(*domain.lower), wp.vec3(*domain.upper)
+    for name in ("lower", "upper", "reach", "top_speed"):
+        setattr(grid, name, getattr(scene.box, name))
     return grid
 
 

@@ -3,7 +3,7 @@
 import functools
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, CLAMPED, FREE
+from fluidbench.particles import CARRIED, CLAMPED, FAULT_ASTRAY, FAULT_STATE, FREE
 
 from ..flow_taichi import pressure, strained
 from ..smoothing import quadratic_spline
@@ -15,15 +15,18 @@ from ..taichi_bridge import (
     Phases,
     Quads,
     Vectors,
+    beyond,
     force_at,
     is_solid,
     ivec3,
     mat3,
+    out_of_reach,
     phase_at,
     struct_of,
     symmetric,
     taichi_func,
     ti,
+    too_fast,
     vec3,
     vec4,
 )
@@ -49,7 +52,7 @@ from .grid_taichi import (
     slots_in_use,
     wrapped,
 )
-from .kernels_warp import ANCHOR, ANCHORED, FAULT_STENCIL, Feedback
+from .kernels_warp import ANCHOR, ANCHORED, CRUSHED, FAULT_STENCIL, STRETCHED, Feedback
 
 spline = taichi_func(quadratic_spline)
 FeedbackT = struct_of(Feedback)
@@ -115,6 +118,8 @@ def g2p(
                 if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
                     volume_ratio[p] *= 1.0 - ti.min(h * feedback.rate * phase.wave_speed * crowding, 0.1)
             free = x + h * v
+            if out_of_reach(grid, free) or too_fast(v, grid.top_speed):
+                ti.atomic_or(fault[0], FAULT_ASTRAY)
             x = contained(grid, free)
             position[p] = x
             for axis in ti.static(range(3)):
@@ -157,11 +162,16 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
                 if held[p] == FREE:
                     a = inertia * c
                 if held[p] != CARRIED:
-                    j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
+                    growth = 1.0 + h * c.trace()
+                    j = volume_ratio[p] * ti.max(growth, CRUSHED)
+                    broken = growth < CRUSHED or beyond(growth, STRETCHED) or beyond(j, STRETCHED) or j < 1.0 / STRETCHED
                     b, s = elastic_normal[p], elastic_shear[p]
                     if phase.shear_modulus > 0.0:
                         b, s = strained(phase, phase.shear_modulus, c, b, s, h)
                         elastic_normal[p], elastic_shear[p] = b, s
+                        broken = broken or beyond(b.sum(), STRETCHED) or b.sum() < 1.0
+                    if broken:
+                        ti.atomic_or(fault[0], FAULT_STATE)
                     volume_ratio[p] = j
                     tau = kirchhoff(phase, j, b, s, c)
                     for i, axis in ti.static(ti.ndrange(3, 3)):

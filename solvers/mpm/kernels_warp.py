@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.particles import CARRIED, CLAMPED, FREE
-from fluidbench.scene import Force, Phase, force_at, is_solid
+from fluidbench.particles import CARRIED, CLAMPED, FAULT_ASTRAY, FAULT_STATE, FREE
+from fluidbench.scene import Force, Phase, force_at, is_solid, out_of_reach, too_fast
 
 from .. import constitutive
 from ..bind import rebound, warp_func
@@ -41,6 +41,8 @@ FAULT_STENCIL = 2
 # they share: a beam falls slowly off it.
 ANCHOR = wp.constant(1.0e4)
 ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
+CRUSHED = wp.constant(0.1)  # share of its volume that is left of a particle in one step, at least
+STRETCHED = wp.constant(1.0e6)  # volume ratio, or trace of the elastic tensor, that no matter reaches [-]
 
 
 @wp.func
@@ -107,7 +109,10 @@ def p2g(
     if held[p] == FREE:
         a = m * c
     if held[p] != CARRIED and on:
-        j *= wp.max(1.0 + h * wp.trace(c), 0.1)
+        growth = 1.0 + h * wp.trace(c)
+        sane = growth >= CRUSHED
+        j *= wp.max(growth, CRUSHED)
+        sane = sane and j > 1.0 / STRETCHED and j < STRETCHED
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
             b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
@@ -120,6 +125,9 @@ def p2g(
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[p] = b
             elastic_shear[p] = s
+            sane = sane and b[0] + b[1] + b[2] > 1.0 and b[0] + b[1] + b[2] < STRETCHED
+        if not sane:
+            wp.atomic_or(fault, 0, FAULT_STATE)
         a -= columns_scaled(kirchhoff(phase, j, b, s, c), (4.0 * h * volume[p]) * wp.cw_mul(grid.inv_dx, grid.inv_dx))
     base = first_node(grid, position[p])
     f = wp.cw_mul(position[p] - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
@@ -301,6 +309,8 @@ def g2p(
             if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
                 volume_ratio[p] = j * (1.0 - wp.min(dt[world] * feedback.rate * phase.wave_speed * crowding, 0.1))
         free = x + dt[world] * v
+        if out_of_reach(free, grid.lower, grid.upper, grid.reach) or too_fast(v, grid.top_speed):
+            wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(grid, free)
         position[p] = x
         for axis in range(3):

@@ -3,7 +3,7 @@ equations."""
 
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, FREE
+from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE, FREE
 from fluidbench.scene import FRICTION, PERIODIC, STICK
 
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
@@ -18,18 +18,21 @@ from ..taichi_bridge import (
     Matrices,
     Phases,
     Vectors,
+    beyond,
     force_at,
     mat3,
+    out_of_reach,
     phase_at,
     rest_density,
     struct_of,
     taichi_func,
     ti,
+    too_fast,
     vec3,
 )
 from . import laws
 from .bonds_taichi import bonded
-from .kernels_warp import SLACK, SLACK_SOLID, Numbers
+from .kernels_warp import FARTHEST, HURRIED, SLACK, SLACK_SOLID, STRETCHED, Numbers
 
 kernel = taichi_func(poly6)
 summed = taichi_func(spiky)
@@ -71,7 +74,7 @@ def seen_moving(box, velocity: ti.template(), entry):
 @ti.kernel
 def predict(
     num: NumbersT, box: BoxT, capacity: int, count: Ints, dt: Floats, force: Forces, held: Ints, velocity: Vectors,
-    position: Vectors, motion: Vectors,
+    position: Vectors, motion: Vectors, fault: Ints,
 ):  # fmt: skip
     for i in range(position.shape[0]):
         world = i // capacity
@@ -79,7 +82,10 @@ def predict(
             v = velocity[i]
             if held[i] == FREE:
                 v += dt[world] * force_at(force, world, position[i])
-            x, back = kept_inside(box, position[i] + dt[world] * v, WALL_INSET * num.spacing)
+            free = position[i] + dt[world] * v
+            if out_of_reach(box, free) or too_fast(v, HURRIED * box.top_speed):
+                ti.atomic_or(fault[0], FAULT_ASTRAY)
+            x, back = kept_inside(box, free, WALL_INSET * num.spacing)
             position[i], motion[i] = x, dt[world] * v + back
 
 
@@ -130,15 +136,19 @@ def correct(
 @ti.kernel
 def apply(
     num: NumbersT, box: BoxT, capacity: int, count: Ints, held: Ints, correction: Vectors,
-    position: Vectors, motion: Vectors,
+    position: Vectors, motion: Vectors, fault: Ints,
 ):  # fmt: skip
     for i in range(position.shape[0]):
         if i % capacity < count[i // capacity] and held[i] == FREE:
             shift = correction[i]
             limit = 0.25 * num.spacing
+            wanted = shift.norm()
             if shift.norm() > limit:
                 shift *= limit / shift.norm()
-            x, back = kept_inside(box, position[i] + shift, WALL_INSET * num.spacing)
+            free = position[i] + shift
+            if out_of_reach(box, free) or beyond(wanted, FARTHEST * num.spacing):
+                ti.atomic_or(fault[0], FAULT_ASTRAY)
+            x, back = kept_inside(box, free, WALL_INSET * num.spacing)
             position[i] = x
             motion[i] += shift + back
 
@@ -155,7 +165,7 @@ def velocities(capacity: int, count: Ints, dt: Floats, held: Ints, motion: Vecto
 def strain(
     num: NumbersT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, dt: Floats,
     phases: Phases, phase_of: Ints, held: Ints, position: Vectors, mass: Floats, volume: Floats, velocity: Vectors,
-    elastic_normal: Vectors, elastic_shear: Vectors, stress: Matrices,
+    elastic_normal: Vectors, elastic_shear: Vectors, stress: Matrices, fault: Ints,
 ):  # fmt: skip
     for i in range(position.shape[0]):
         world = i // capacity
@@ -179,6 +189,8 @@ def strain(
                 if held[i] != CARRIED:
                     b, s = strained(phase, modulus, l, b, s, dt[world])
                     elastic_normal[i], elastic_shear[i] = b, s
+                    if beyond(b.sum(), STRETCHED) or b.sum() < 1.0:
+                        ti.atomic_or(fault[0], FAULT_STATE)
                 carried = elastic_stress(modulus, b, s, 0.0) @ correction
             stress[i] = carried
 

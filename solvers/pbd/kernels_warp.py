@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.particles import CARRIED
-from fluidbench.scene import Box, Force, Phase, force_at
+from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE
+from fluidbench.scene import Box, Force, Phase, force_at, out_of_reach, too_fast
 
 from .. import constitutive
 from ..aging import rest_density
@@ -35,6 +35,9 @@ conveyed_modulus = warp_func(laws.conveyed_modulus, laws.largest_modulus)
 SLACK = wp.constant(
     2.0e-3
 )  # density that is left alone, over that at rest: what the lattices of round bodies are off by
+HURRIED = wp.constant(10.0)  # corrections of a crowded start are fast for a substep: this much beyond any matter's speed
+FARTHEST = wp.constant(1.0e3)  # spacings beyond which no constraint wants a particle to move
+STRETCHED = wp.constant(1.0e6)  # trace of the elastic tensor that no matter reaches [-]
 SLACK_SOLID = wp.constant(0.1)  # a solid's bonds keep its density; the constraint only keeps its parts apart
 
 
@@ -57,7 +60,7 @@ def predict(
     num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
     force: wp.array(dtype=Force), held: wp.array(dtype=int), velocity: wp.array(dtype=wp.vec3),
     # outputs
-    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
 ):  # fmt: skip
     """Position under the present velocity and gravity. `motion` carries the displacement of the substep by itself: as a
     difference of float32 positions it would lose the velocity at small dt."""
@@ -69,6 +72,8 @@ def predict(
         if held[i] == 0:
             v += h * force_at(force[world], position[i])
         free = position[i] + h * v
+        if out_of_reach(free, box.lower, box.upper, box.reach) or too_fast(v, HURRIED * box.top_speed):
+            wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
         motion[i] = h * v + pushed(box, free, x)
         position[i] = x
@@ -147,7 +152,7 @@ def apply(
     num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), held: wp.array(dtype=int),
     correction: wp.array(dtype=wp.vec3),
     # outputs
-    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
 ):  # fmt: skip
     """Move by the correction, at most a quarter of a spacing, and stay inside the walls."""
     i = wp.tid()
@@ -158,6 +163,8 @@ def apply(
         if length > limit:
             shift = shift * (limit / length)
         free = position[i] + shift
+        if out_of_reach(free, box.lower, box.upper, box.reach) or not (length <= FARTHEST * num.spacing):
+            wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
         motion[i] = motion[i] + shift + pushed(box, free, x)
         position[i] = x
@@ -185,7 +192,7 @@ def strain(
     velocity: wp.array(dtype=wp.vec3),
     # outputs
     elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-    stress: wp.array(dtype=wp.mat33),
+    stress: wp.array(dtype=wp.mat33), fault: wp.array(dtype=int),
 ):  # fmt: skip
     """Strain of the substep by the common material law, and the elastic deviator that answers it. There is no isotropic
     tension: density constraints only push."""
@@ -230,6 +237,8 @@ def strain(
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[i] = b
             elastic_shear[i] = s
+            if not (b[0] + b[1] + b[2] > 1.0 and b[0] + b[1] + b[2] < STRETCHED):
+                wp.atomic_or(fault, 0, FAULT_STATE)
         stress[i] = elastic_stress(modulus, b, s, 0.0) * correction
 
 

@@ -213,7 +213,7 @@ class SolverPBD(Solver):
         self._launch(
             self.kernels.predict,
             [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held, pool.velocity],
-            [pool.position, self.motion],
+            [pool.position, self.motion, pool.fault],
         )
 
     def lists(self) -> None:
@@ -249,7 +249,7 @@ class SolverPBD(Solver):
         self._launch(
             self.kernels.apply,
             [self.num, self.scene.box, *self._active(), pool.held, self.correction],
-            [pool.position, self.motion],
+            [pool.position, self.motion, pool.fault],
         )
 
     def velocities(self) -> None:
@@ -266,7 +266,7 @@ class SolverPBD(Solver):
             self.kernels.strain,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
              pool.position, pool.mass, pool.volume, pool.velocity],
-            [pool.elastic_normal, pool.elastic_shear, self.stress],
+            [pool.elastic_normal, pool.elastic_shear, self.stress, pool.fault],
         )  # fmt: skip
 
     def pull(self) -> None:

@@ -4,7 +4,7 @@ equations."""
 import functools
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, FREE
+from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE, FREE
 from fluidbench.scene import FRICTION, PERIODIC
 
 from ..aging import DISORDER
@@ -29,17 +29,20 @@ from ..taichi_bridge import (
     Matrices,
     Phases,
     Vectors,
+    beyond,
     force_at,
     is_solid,
     mat3,
+    out_of_reach,
     phase_at,
     rest_density,
     struct_of,
     taichi_func,
     ti,
+    too_fast,
     vec3,
 )
-from .kernels_warp import FLOOR, WHOLE, Smoothing
+from .kernels_warp import CRUSHED, FLOOR, STRETCHED, WHOLE, Smoothing
 
 kernel = taichi_func(wendland)
 slope = taichi_func(wendland_slope)
@@ -50,7 +53,7 @@ SmoothingT = struct_of(Smoothing)
 def move(
     box: BoxT, spacing: float, capacity: int, count: Ints, dt: Floats, phases: Phases, phase_of: Ints, force: Forces,
     held: Ints, mass: Floats, volume: Floats, acceleration: Vectors, new_density: Floats,
-    position: Vectors, velocity: Vectors, density: Floats, lift: Vectors,
+    position: Vectors, velocity: Vectors, density: Floats, lift: Vectors, fault: Ints,
 ):  # fmt: skip
     for i in range(position.shape[0]):
         world = i // capacity
@@ -64,6 +67,8 @@ def move(
                 carried = 0.5 * rest * rest / phase.bulk_modulus * weight
             lift[i] = carried
             free = position[i] + h * v
+            if out_of_reach(box, free) or too_fast(v, box.top_speed):
+                ti.atomic_or(fault[0], FAULT_ASTRAY)
             x = contained(box, free, WALL_INSET * spacing)
             for axis in ti.static(range(3)):
                 if x[axis] != free[axis] and box.lower_kind[axis] != PERIODIC:
@@ -102,7 +107,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         phases: Phases, phase_of: Ints, held: Ints, position: Vectors, velocity: Vectors, mass: Floats, volume: Floats,
         density: Floats, lift: Vectors,
         elastic_normal: Vectors, elastic_shear: Vectors, new_density: Floats, load: Floats, stress: Matrices,
-        rate: Matrices,
+        rate: Matrices, fault: Ints,
     ):  # fmt: skip
         for i in range(position.shape[0]):
             world = i // capacity
@@ -149,8 +154,8 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 tolerance = num.density_tolerance
                 if grown:
                     tolerance = ti.max(tolerance, DISORDER)
-                beyond = ti.max(ti.abs(drift) - tolerance * rho, 0.0)
-                drift = beyond if drift > 0.0 else -beyond
+                gap = ti.max(ti.abs(drift) - tolerance * rho, 0.0)
+                drift = gap if drift > 0.0 else -gap
                 if phase.relaxation_rate > 0.0 or grown:
                     drift = ti.max(drift, ti.min(rest - rho, 0.0))
                 if is_solid(phase):
@@ -158,7 +163,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 h = dt[world]
                 growth = approach + num.density_feedback * sound / num.h * whole * drift
                 growth += 2.0 * num.density_diffusion * num.h * sound * spread / rho
-                rho = ti.max(rho + h * growth, FLOOR * rest)
+                rho += h * growth
+                broken = rho <= -rest or beyond(rho, CRUSHED * rest)
+                rho = ti.max(rho, FLOOR * rest)
                 new_density[i] = rho
                 p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
                 scale = 1.0
@@ -169,10 +176,13 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     if held[i] != CARRIED:
                         b, s = strained(phase, phase.shear_modulus, gradient, b, s, h)
                         elastic_normal[i], elastic_shear[i] = b, s
+                        broken = broken or beyond(b.sum(), STRETCHED) or b.sum() < 1.0
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     stress[i] = scale * (cauchy @ correction)
                 else:
                     load[i] = scale * p
+                if broken:
+                    ti.atomic_or(fault[0], FAULT_STATE)
 
     @ti.kernel
     def force(

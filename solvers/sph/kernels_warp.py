@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.particles import CARRIED
-from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid
+from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE
+from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid, out_of_reach, too_fast
 
 from .. import constitutive
 from ..aging import DISORDER, rest_density
@@ -55,6 +55,8 @@ class Smoothing:
 
 
 FLOOR = wp.constant(0.1)  # least density over that at rest
+CRUSHED = wp.constant(1.0e3)  # density over that at rest that no matter reaches
+STRETCHED = wp.constant(1.0e6)  # the same of the trace of the elastic tensor
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
 
 
@@ -73,7 +75,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         # outputs
         elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
         new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
-        rate: wp.array(dtype=wp.mat33),
+        rate: wp.array(dtype=wp.mat33), fault: wp.array(dtype=int),
     ):  # fmt: skip
         """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
@@ -154,7 +156,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
             inflow += num.density_feedback * sound / num.h * whole * drift
             h = dt[world]
             growth = inflow + 2.0 * num.density_diffusion * num.h * sound * spread / rho
-            rho = wp.max(rho + h * growth, FLOOR * rest)
+            rho += h * growth
+            sane = rho > -rest and rho < CRUSHED * rest
+            rho = wp.max(rho, FLOOR * rest)
             new_density[i] = rho
             p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
             scale = 1.0 / (rho * rho)
@@ -175,11 +179,14 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     s = wp.vec3(b_xy, b_xz, b_yz)
                     elastic_normal[i] = b
                     elastic_shear[i] = s
+                    sane = sane and b[0] + b[1] + b[2] > 1.0 and b[0] + b[1] + b[2] < STRETCHED
                 g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J
                 # With the correction of its gradient stress does on the particles exactly the work of the strain.
                 stress[i] = scale * (elastic_stress(g, b, s, p) * correction)
             else:
                 load[i] = scale * p
+            if not sane:
+                wp.atomic_or(fault, 0, FAULT_STATE)
 
     def force(
         num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
@@ -320,7 +327,7 @@ def move(
     acceleration: wp.array(dtype=wp.vec3), new_density: wp.array(dtype=float),
     # outputs
     position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), density: wp.array(dtype=float),
-    lift: wp.array(dtype=wp.vec3),
+    lift: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
 ):  # fmt: skip
     """Symplectic Euler; a particle that would cross a wall stops at it.
 
@@ -341,6 +348,8 @@ def move(
             carried = stiffness * (force_at(force[world], position[i]) - acceleration[i])
         lift[i] = carried
         free = position[i] + h * v
+        if out_of_reach(free, box.lower, box.upper, box.reach) or too_fast(v, box.top_speed):
+            wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * spacing)
         for axis in range(3):
             if x[axis] != free[axis] and box.lower_kind[axis] != PERIODIC:

@@ -197,7 +197,7 @@ class SolverSPH(Solver):
             self.kernels.strain,
             pool.size,
             [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.volume, pool.density, pool.lift],
-            [*elastic, self.new_density, self.load, self.stress, self.rate],
+            [*elastic, self.new_density, self.load, self.stress, self.rate, pool.fault],
         )
 
     def force(self) -> None:
@@ -217,7 +217,7 @@ class SolverSPH(Solver):
             pool.size,
             [scene.box, scene.spacing, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase, scene.force,
              pool.held, pool.mass, pool.volume, self.acceleration, self.new_density],
-            [pool.position, pool.velocity, pool.density, pool.lift],
+            [pool.position, pool.velocity, pool.density, pool.lift, pool.fault],
         )  # fmt: skip
 
     def prepare(self) -> None:

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from fluidbench.scene import Force, force_at
+from fluidbench.scene import Box, Force, force_at
 from fluidbench.solver import Config, Solver
 from fluidbench.timestep import Bound
 
@@ -19,7 +19,7 @@ def fly(
     dt: wp.array(dtype=float),
     force: wp.array(dtype=Force),
     held: wp.array(dtype=int),
-    floor: float,
+    box: Box,
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
 ):
@@ -30,10 +30,10 @@ def fly(
         if held[i] == 0:
             v += dt[world] * force_at(force[world], position[i])
         x = position[i] + dt[world] * v
-        if x[2] < floor:
-            x = wp.vec3(x[0], x[1], floor)
+        inside = wp.max(wp.min(x, box.upper), box.lower)
+        if wp.length_sq(inside - x) > 0.0:
             v = wp.vec3(0.0, 0.0, 0.0)
-        position[i] = x
+        position[i] = inside
         velocity[i] = v
 
 
@@ -55,8 +55,7 @@ class Ballistic(Solver):
 
     def substep(self) -> None:
         pool, scene = self.pool, self.scene
-        floor = float(scene.scenario.domain.lower[2])
-        inputs: list[Any] = [pool.capacity, pool.count, scene.dt, scene.force, pool.held, floor]
+        inputs: list[Any] = [pool.capacity, pool.count, scene.dt, scene.force, pool.held, scene.box]
         wp.launch(fly, pool.size, [*inputs, pool.position, pool.velocity], device=scene.device)
 
     def densities(self) -> np.ndarray:
