@@ -4,17 +4,13 @@ import math
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from .material import NonNegative, Positive
+from .model import Matrix, Model, NonNegative, Positive, Vector
 
-Vector = tuple[float, float, float]
-Matrix = tuple[Vector, Vector, Vector]
+USERS = {"size": ("box",), "radius": ("cylinder", "sphere"), "height": ("cylinder",)}
+"""Keys that only some shapes use."""
 CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-
-
-class Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Wave(Model):
@@ -53,6 +49,7 @@ class Body(Model):
         missing = [key for key in needs if getattr(self, key) is None]
         if missing:
             raise ValueError(f"a {self.kind} needs {' and '.join(missing)}")
+        self.refuse_idle(self.kind, USERS)
         if self.start > 0 and (self.velocity_gradient or self.wave or any(self.angular_velocity)):
             raise ValueError("a body that appears later moves as a whole: give it a velocity alone")
         if self.size is not None and min(self.size) <= 0:

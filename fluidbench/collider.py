@@ -5,8 +5,10 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from .body import Model, Vector
-from .cure import NonNegative, Positive
+from .model import Model, NonNegative, Positive, Vector
+
+USERS = {"size": ("box",), "radius": ("sphere",)}
+"""Keys that only some primitives use."""
 
 
 class Part(Model):
@@ -23,6 +25,7 @@ class Part(Model):
             raise ValueError("a box needs size, three positive edge lengths [m]")
         if self.kind == "sphere" and self.radius is None:
             raise ValueError("a sphere needs radius [m]")
+        self.refuse_idle(self.kind, USERS)
         return self
 
     @property
@@ -42,7 +45,7 @@ class Part(Model):
 class Collider(Model):
     """Parts that move with the nozzle, whatever they touch; material slides along them with Coulomb friction."""
 
-    parts: tuple[Part, ...] = Field(description="its primitives")
+    parts: tuple[Part, ...] = Field(min_length=1, description="its primitives")
     clearance: NonNegative = Field(default=0.0, description="how far all parts are raised above the nozzle exit [m]")
     friction: NonNegative = Field(default=0.3, description="Coulomb friction coefficient [-]")
 

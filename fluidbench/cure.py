@@ -4,22 +4,25 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from .model import Model, NonNegative, Positive
 
 LEVELS = 100  # a continuous degree of cure moves in steps of one hundredth
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+USERS = {
+    "time": ("stages", "linear"), "stages": ("stages",), "rate": ("first_order", "kamal_sourour", "avrami"),
+    "rate_autocatalytic": ("kamal_sourour",), "exponent": ("avrami",),
+}  # fmt: skip
+"""Keys that only some laws use."""
 
 
-class Cure(BaseModel):
+class Cure(Model):
     """A schedule from the fresh to the cured material; what is not given stays as it is when fresh.
 
     Degree of cure alpha at time t after the onset (age `delay`, give or take `jitter`):
     jump: 1; stages: n equal steps in `time`; linear: t / time; first_order: 1 - exp(-k t);
     kamal_sourour (m = n = 1): d alpha/dt = (k + k2 alpha)(1 - alpha); avrami: 1 - exp(-(k t)^n).
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["jump", "stages", "linear", "first_order", "kamal_sourour", "avrami"] = Field(
         "jump", description="law of the degree of cure"
@@ -41,6 +44,7 @@ class Cure(BaseModel):
 
     @model_validator(mode="after")
     def _complete(self) -> "Cure":
+        self.refuse_idle(self.kind, USERS)
         if self.kind in ("stages", "linear") and self.time is None:
             raise ValueError(f"{self.kind} needs time, from the onset to the cured material [s]")
         if self.kind in ("first_order", "kamal_sourour", "avrami") and self.rate is None:

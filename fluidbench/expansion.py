@@ -4,14 +4,19 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from .cure import NonNegative, Positive
+from .model import Model, NonNegative, Positive
 
+USERS = {
+    "time": ("growth",), "split": ("growth",), "passes": ("spawn",), "interval": ("spawn",), "radius": ("spawn",),
+    "impulse": ("spawn",), "noise": ("spawn",), "margin": ("spawn",),
+}  # fmt: skip
+"""Keys that only one kind uses."""
 LARGEST = 1.5  # volume of a particle, over spacing^3, beyond which growth splits it in two
 
 
-class Expansion(BaseModel):
+class Expansion(Model):
     """Mass stays, rest volume grows `ratio`-fold.
 
     growth: R(t) = 1 + (ratio - 1)(1 - exp(-t / time)) from the age `delay`; fresh foam pushes its neighbours, and a
@@ -20,12 +25,10 @@ class Expansion(BaseModel):
     it, and again for every further pass.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     kind: Literal["growth", "spawn"] = Field(
         default="growth", description="continuous growth, or parents that become children"
     )
-    ratio: Annotated[float, Field(allow_inf_nan=False)] = Field(description="final volume over fresh volume [-]")
+    ratio: float = Field(description="final volume over fresh volume [-]")
     delay: NonNegative = Field(default=0.0, description="age at which it begins, counted from the nozzle [s]")
     jitter: NonNegative = Field(default=0.0, description="each particle begins up to this much earlier or later [s]")
     time: Positive = Field(default=1.0, description="growth: time constant of the approach to the ratio [s]")
@@ -45,6 +48,7 @@ class Expansion(BaseModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Expansion":
+        self.refuse_idle(self.kind, USERS)
         if self.ratio < 1.0:
             raise ValueError(f"ratio = {self.ratio} would shrink it; the ratio is final over fresh volume, at least 1")
         if self.jitter > self.delay:

@@ -75,10 +75,9 @@ def audit_integers(
 ):  # fmt: skip
     """The same for whole numbers; what is broken becomes `low`, lest it be used as an address."""
     i = wp.tid()
-    if i % capacity < count[i / capacity]:
-        if values[i] < low or values[i] > high:
-            wp.atomic_or(fault, 0, FAULT_STATE)
-            values[i] = low
+    if i % capacity < count[i / capacity] and (values[i] < low or values[i] > high):
+        wp.atomic_or(fault, 0, FAULT_STATE)
+        values[i] = low
 
 
 @wp.kernel
@@ -89,10 +88,9 @@ def audit_positions(
 ):  # fmt: skip
     """Mark particles that are nowhere, and put them in the middle: positions become addresses in the passes."""
     i = wp.tid()
-    if i % capacity < count[i / capacity]:
-        if out_of_reach(position[i], box.lower, box.upper, box.reach):
-            wp.atomic_or(fault, 0, FAULT_ASTRAY)
-            position[i] = 0.5 * (box.lower + box.upper)
+    if i % capacity < count[i / capacity] and out_of_reach(position[i], box.lower, box.upper, box.reach):
+        wp.atomic_or(fault, 0, FAULT_ASTRAY)
+        position[i] = 0.5 * (box.lower + box.upper)
 
 
 @dataclass(frozen=True)

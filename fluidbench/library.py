@@ -6,8 +6,13 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from .errors import UserError, suggestion
+from .errors import UserError, quoted, suggestion
 from .scenario import Scenario
+from .solver import check_numerics
+
+DEEPEST = 32  # files that extend one another
+LARGEST = 2**20  # bytes of a scenario file
+MOST_LINES = 5  # mistakes that are told at once
 
 
 def shipped() -> dict[str, Path]:
@@ -20,15 +25,22 @@ def shipped() -> dict[str, Path]:
 
 def find(reference: str | Path) -> Path:
     """The file meant by a path or by the name of a shipped scenario."""
-    path = Path(reference)
-    if path.suffix == ".toml" or path.exists():
-        if not path.is_file():
-            raise UserError(f"no such scenario file: {path}")
+    known, path = shipped(), Path(reference)
+    try:
+        there, is_file = path.exists(), path.is_file()
+    except (OSError, ValueError) as error:  # a name that is too long, or has a null character
+        raise UserError(f"{quoted(str(reference))} is no file name: {_why(error)}") from None
+    if str(reference) in known and not (there and path.suffix == ".toml"):
+        return known[str(reference)]
+    if path.suffix == ".toml" or there:
+        if not is_file:
+            raise UserError(f"no such scenario file: {quoted(str(path))}")
         return path
-    known = shipped()
-    if str(reference) not in known:
-        raise UserError(f"no scenario named '{reference}'{suggestion(str(reference), known)}")
-    return known[str(reference)]
+    raise UserError(f"no scenario named {quoted(str(reference))}{suggestion(str(reference), known)}")
+
+
+def _why(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error)
 
 
 def load(
@@ -44,8 +56,10 @@ def load(
     table = _read(path, ())
     table.setdefault("name", path.stem)
     shorter = table.pop("quick", None)
+    if not isinstance(shorter, dict | None):
+        raise UserError(f"{path}: quick: a table is wanted (got {quoted(shorter)})")
     if quick:
-        table = _merge(table, shorter) if shorter is not None else table | {"spacing": 4 / 3 * table.get("spacing", 0)}
+        table = _merge(table, shorter) if shorter is not None else _coarser(table)
     if isinstance(overrides, list):
         overrides = dict(parse_override(text) for text in overrides)
     for key, value in (overrides or {}).items():
@@ -53,25 +67,46 @@ def load(
     return validate(table, str(path))
 
 
+def _coarser(table: dict[str, Any]) -> dict[str, Any]:
+    """A third more spacing, where there is one that is a number."""
+    spacing = table.get("spacing")
+    return table | {"spacing": 4 / 3 * spacing} if isinstance(spacing, int | float) else table
+
+
 def validate(table: dict[str, Any], where: str) -> Scenario:
     """A table as a Scenario; raises UserError with one line a mistake, each with the key and the cure."""
     try:
-        return Scenario.model_validate(table)
+        scenario = Scenario.model_validate(table)
     except ValidationError as error:
-        raise UserError("\n".join(_explain(item, where) for item in error.errors())) from None
+        found = error.errors(include_url=False, include_context=False)
+        lines = list(dict.fromkeys(_explain(item, where) for item in found[:MOST_LINES]))
+        more = [f"{where}: and {len(found) - MOST_LINES} more mistakes"] if len(found) > MOST_LINES else []
+        raise UserError("\n".join([*lines, *more])) from None
+    except (ArithmeticError, MemoryError, RecursionError) as error:
+        raise UserError(f"{where}: cannot be computed with ({type(error).__name__}: {error})") from None
+    try:
+        check_numerics(scenario)
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
+    return scenario
 
 
 def parse_override(text: str) -> tuple[str, Any]:
     """'key=value' -> (key, value), the value read as TOML and otherwise as a string; `none` takes the key out."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise UserError(f"--set takes key=value, such as material.yield_stress=50; got '{text}'")
+        raise UserError(f"--set takes key=value, such as material.yield_stress=50; got {quoted(text)}")
     if value.strip() == "none":
         return key.strip(), None
     try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+        found = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
         return key.strip(), value.strip()
+    except (RecursionError, ValueError) as error:
+        raise UserError(f"--set {quoted(key.strip())[1:-1]}: {quoted(value)} cannot be read: {error}") from None
+    if set(found) != {"value"}:
+        raise UserError(f"--set takes one key=value; got {quoted(text)}")
+    return key.strip(), found["value"]
 
 
 def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
@@ -79,17 +114,35 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     path = path.resolve()
     if path in seen:
         raise UserError(f"{path}: extends itself by way of {seen[-1].name}")
+    if len(seen) >= DEEPEST:
+        raise UserError(f"{seen[0]}: extends more than {DEEPEST} files deep")
     try:
+        if path.stat().st_size > LARGEST:
+            raise UserError(f"{path}: {path.stat().st_size} bytes are no scenario; {LARGEST} at most")
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:  # TOML's and Unicode's errors are values'
+        raise UserError(f"{path}: not valid TOML: {_short(error)}") from None
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     base = table.pop("extends", None)
     if base is None:
         return table
-    beside = path.parent / str(base)
-    return _merge(_read(beside if beside.is_file() else find(base), (*seen, path)), table)
+    if not isinstance(base, str):
+        raise UserError(f"{path}: extends: the name of a scenario or a file is wanted (got {quoted(base)})")
+    try:
+        beside = path.parent / base
+        further = beside if beside.is_file() else find(base)
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: extends: {quoted(base)} is no file name: {_why(error)}") from None
+    except UserError as error:
+        raise UserError(f"{path}: extends: {error}") from None
+    return _merge(_read(further, (*seen, path)), table)
+
+
+def _short(error: Exception) -> str:
+    """What an error says, on one line of bearable length."""
+    text = " ".join(str(error).split())
+    return text if len(text) <= 200 else f"{text[:200]}..."
 
 
 def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
@@ -104,11 +157,13 @@ def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
 def assign(table: dict[str, Any], key: str, value: Any) -> None:
     """Set a dotted key, stepping into tables by name and into lists by number; None takes it out."""
     *parents, last = key.split(".")
+    if len(parents) > DEEPEST or not all((*parents, last)):
+        raise UserError(f"--set {quoted(key)}: keys are names joined by dots, such as material.yield_stress")
     node: Any = table
     for part in parents:
-        node = node[_position(node, part, key)] if isinstance(node, list) else node.setdefault(part, {})
+        node = node[_position(node, part, key)] if isinstance(node, list | tuple) else node.setdefault(part, {})
         if not isinstance(node, dict | list):
-            raise UserError(f"--set {key}: '{part}' is a value, not a table")
+            raise UserError(f"--set {key}: {quoted(part)} is a value, not a table")
     if isinstance(node, list):
         node[_position(node, last, key)] = value
     elif value is None:
@@ -117,9 +172,9 @@ def assign(table: dict[str, Any], key: str, value: Any) -> None:
         node[last] = value
 
 
-def _position(node: list[Any], part: str, key: str) -> int:
-    if not part.isdigit() or int(part) >= len(node):
-        raise UserError(f"--set {key}: '{part}' must be a number below {len(node)}")
+def _position(node: list[Any] | tuple[Any, ...], part: str, key: str) -> int:
+    if not (part.isascii() and part.isdigit()) or len(part) > 9 or int(part) >= len(node):
+        raise UserError(f"--set {key}: {quoted(part)} must be a number below {len(node)}")
     return int(part)
 
 
@@ -127,13 +182,13 @@ def _explain(item: Any, where: str) -> str:
     """One pydantic error in words."""
     path = [str(part) for part in item["loc"] if not str(part).startswith(("literal[", "function-", "tagged"))]
     path = path or [str(part) for part in item["loc"]]
-    key = ".".join(path) or "scenario"
+    key = quoted(".".join(path))[1:-1] or "scenario"
     if item["type"] == "extra_forbidden":
         return f"{where}: unknown key '{key}'{suggestion(path[-1], _fields_at(path[:-1]))}"
     if item["type"] == "missing":
         return f"{where}: '{key}' is missing"
-    message = item["msg"].removeprefix("Value error, ")
-    got = "" if item["type"] == "value_error" else f" (got {item['input']!r})"
+    message = _short(item["msg"]).removeprefix("Value error, ")
+    got = "" if item["type"] == "value_error" else f" (got {quoted(item['input'])})"
     return f"{where}: {key}: {message[0].lower()}{message[1:]}{got}"
 
 

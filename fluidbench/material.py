@@ -4,22 +4,19 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from .cure import Cure, NonNegative, Positive
+from .cure import Cure
 from .expansion import Expansion
+from .model import Model, NonNegative, Positive
 
-__all__ = ["Material", "NonNegative", "Positive"]
 
-
-class Material(BaseModel):
+class Material(Model):
     """An elasto-viscoplastic material; its limits are a Newtonian liquid, a Maxwell liquid, a Bingham or
     Herschel-Bulkley paste and an elastic solid (see docs/physics.md).
 
     Without `youngs_modulus` the material has no shear stiffness: a liquid whose only shear stress is `viscosity`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     density: Positive = Field(description="rest density [kg/m^3]")
     youngs_modulus: Positive | None = Field(None, description="Young's modulus E [Pa]; none for a liquid")

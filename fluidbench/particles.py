@@ -6,10 +6,10 @@ import numpy as np
 import warp as wp
 
 from .errors import UserError
+from .scenario import ADDRESSABLE
 from .scene import Scene
 
 wp.set_module_options({"enable_backward": False})
-MAX_SLOTS = 2**26  # neighbour lists keep 26 bits for an index
 
 FREE, CARRIED, CLAMPED = wp.constant(0), wp.constant(1), wp.constant(2)
 FAULT_ASTRAY, FAULT_STATE = wp.constant(1024), wp.constant(2048)  # bits of Pool.fault: the run has blown up
@@ -44,9 +44,9 @@ class Pool:
     """
 
     def __init__(self, scene: Scene, capacity: int) -> None:
-        if scene.worlds * capacity > MAX_SLOTS:
+        if scene.worlds * capacity > ADDRESSABLE:
             raise UserError(
-                f"{scene.worlds} world(s) of {capacity} particles exceed the {MAX_SLOTS} that can be addressed; "
+                f"{scene.worlds} world(s) of {capacity} particles exceed the {ADDRESSABLE} that can be addressed; "
                 "use a larger spacing"
             )
         self.scene, self.capacity, self.worlds = scene, whole_warps(capacity), scene.worlds

@@ -1,62 +1,114 @@
 """One run in one child process: scenario and method in, record out.
 
-The child gets clean peak memory and a wall limit; a crash of the child becomes a verdict. It reports progress as lines
-of JSON on its standard output, and ends itself when its parent is gone (its standard input closes).
+The child gets clean peak memory and a wall limit; whatever happens to it, there is a record that says so. It reports
+progress as lines of JSON on its standard output. `python -m fluidbench.run FOLDER` is such a child: it takes job.json
+from the folder and leaves record.json there.
 """
 
 import json
 import os
-import platform
-import resource
+import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import __version__
-from .scenario import Scenario
-from .store import RECORD, write_atomically
-from .target import BACKENDS, HERE, Target
+from .errors import Obstacle, UserError
+from .offspring import command, environment
+from .store import key_of, remove_quietly, write_atomically, write_record
+from .target import HERE, Target
 
-PROGRESS = "@progress "
+PROGRESS, OBSTACLE = "@progress ", "@obstacle "
+ATTENDED = "--attended"  # to a child: end when standard input closes, which then is the parent's end
 GRACE = 120.0  # seconds beyond the wall limit for compiling, measuring and writing
+CHECKPOINTS = 300.0  # wall seconds between checkpoints
+OOM_COUNTERS = (Path("/sys/fs/cgroup/memory.events"), Path("/sys/fs/cgroup/memory/memory.oom_control"))
 
 
 @dataclass(frozen=True)
 class Job:
-    """Everything that determines a run."""
+    """One run: what it is (scenario, method, target, repeat, variant), and how it is watched."""
 
     scenario: dict[str, Any]
     method: str
     target: Target = HERE
     repeat: int = 0
+    variant: str = ""  # sets runs apart that differ in how they are watched, where that is measured
     wall_limit: float | None = None
     keep_frames: bool = False
     film_every: float | None = None
+    checkpoint_every: float = field(default=CHECKPOINTS)  # wall seconds; 0 for none
 
     def inputs(self) -> dict[str, Any]:
-        """What names the run; how long it may take does not."""
-        unused = {"film_every"} if self.film_every is None else set()
-        return {k: v for k, v in asdict(self).items() if k not in {"wall_limit", *unused}}
+        """What a run is; how long it may take, and whether it is filmed, is not."""
+        return {
+            "scenario": self.scenario, "method": self.method, "target": asdict(self.target), "repeat": self.repeat,
+            **({"variant": self.variant} if self.variant else {}),
+        }  # fmt: skip
+
+    @property
+    def key(self) -> str:
+        return key_of(self.inputs())
+
+    def heading(self) -> dict[str, Any]:
+        """How every record of this job begins, whatever became of it."""
+        return {
+            "scenario": self.scenario["name"], "method": self.method, **asdict(self.target), "repeat": self.repeat,
+            "key": self.key,
+        }  # fmt: skip
 
 
 def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | None = None) -> dict[str, Any]:
-    """Run a job in a child process and return its record; whatever happens to the child, there is a record."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Run a job in a child process and return its record; whatever happens to the child, there is a record.
+
+    Raises Obstacle where a result cannot be written.
+    """
     write_atomically(folder / "job.json", json.dumps(asdict(job), indent=1))
-    (folder / RECORD).unlink(missing_ok=True)
+    for name in ("record.json", "series.parquet", "final.npz"):
+        _make_way(folder / name)
+    kills = _oom_kills()
+    code, timed, obstacle = _attend(job, folder, progress)
+    if obstacle:
+        raise Obstacle(obstacle)
+    record = _read(folder)
+    return record if record is not None and code == 0 else _post_mortem(job, folder, code, timed, _oom_kills() > kills)
+
+
+def _make_way(path: Path) -> None:
+    """Remove what lies where a result will be, were it a folder."""
+    import shutil
+
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        remove_quietly(path)
+
+
+def _attend(
+    job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | None
+) -> tuple[int, bool, str]:  # fmt: skip
+    """Start the child and listen until it ends: (exit code, whether it was stopped for its time, what kept it)."""
     limit = None if job.wall_limit is None else job.wall_limit + GRACE
-    with (folder / "log.txt").open("w") as log:
+    timed, obstacle = threading.Event(), ""
+    _make_way(folder / "log.txt")
+    try:
+        log = (folder / "log.txt").open("w")
+    except OSError as error:
+        raise Obstacle(f"cannot write {folder / 'log.txt'}: {error.strerror}") from None
+    with log:
         child = subprocess.Popen(
-            [sys.executable, "-m", "fluidbench.run", str(folder)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True,
+            command("fluidbench.run", str(folder), ATTENDED), env=environment(),
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, errors="replace",
         )  # fmt: skip
-        killer = threading.Timer(limit, child.kill) if limit is not None else None
+
+        def stop() -> None:
+            timed.set()
+            child.kill()
+
+        killer = threading.Timer(limit, stop) if limit is not None else None
         if killer is not None:
             killer.start()
         try:
@@ -65,6 +117,8 @@ def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | 
                 if line.startswith(PROGRESS):
                     if progress is not None:
                         progress(json.loads(line[len(PROGRESS) :]))
+                elif line.startswith(OBSTACLE):
+                    obstacle = line[len(OBSTACLE) :].strip()
                 else:
                     log.write(line)
             child.wait()
@@ -75,143 +129,51 @@ def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | 
         finally:
             if killer is not None:
                 killer.cancel()
-    path = folder / RECORD
-    if path.is_file():
-        return json.loads(path.read_text())
-    return _post_mortem(job, folder, child.returncode, killer is not None and killer.finished.is_set())
+    return child.returncode, timed.is_set(), obstacle
 
 
-def _post_mortem(job: Job, folder: Path, code: int, timed: bool) -> dict[str, Any]:
+def _read(folder: Path) -> dict[str, Any] | None:
+    """The record that a child has left, if it is whole."""
+    from .store import read_record
+
+    return read_record(folder)[0]
+
+
+def _oom_kills() -> int:
+    """How many processes of this control group the system has killed for want of memory; 0 where it does not say."""
+    for path in OOM_COUNTERS:
+        try:
+            counts = dict(line.split() for line in path.read_text().splitlines())
+            return int(counts.get("oom_kill", 0))
+        except (OSError, ValueError):
+            continue
+    return 0
+
+
+def _post_mortem(job: Job, folder: Path, code: int, timed: bool, starved: bool) -> dict[str, Any]:
     """The record of a child that left none."""
+    return write_record(
+        folder, job.heading() | {"verdict": "timeout" if timed else "error",
+                                 "reason": _cause(job, folder, code, timed, starved)},
+    )  # fmt: skip
+
+
+def _cause(job: Job, folder: Path, code: int, timed: bool, starved: bool) -> str:
+    """What became of a child, in words."""
+    if timed:
+        return f"its process was stopped {GRACE:g} s after the wall limit of {job.wall_limit:g} s; raise --wall-limit"
+    if code < 0:
+        name = signal.Signals(-code).name if -code in {*signal.Signals} else f"signal {-code}"
+        why = {
+            "SIGKILL": "the system ran out of memory" if starved else "by somebody, or by the system for its memory",
+            "SIGSEGV": "it touched memory that is not its own: please report it", "SIGBUS": "a bus error",
+            "SIGILL": "an instruction that this processor does not know", "SIGTERM": "it was asked to end",
+            "SIGINT": "it was interrupted", "SIGABRT": "it gave up",
+        }.get(name, "")  # fmt: skip
+        return f"its process was killed ({name})" + (f": {why}" if why else "")
     lines = (folder / "log.txt").read_text(errors="replace").strip().splitlines()
     last = lines[-1] if lines else "no message"
-    reason = f"the run's process ended with code {code}: {last}"
-    record = {
-        "scenario": job.scenario["name"], "method": job.method, **asdict(job.target),
-        "repeat": job.repeat, "verdict": "timeout" if timed and code < 0 else "error", "reason": reason,
-    }  # fmt: skip
-    write_atomically(folder / RECORD, json.dumps(record, indent=1))
-    return record
-
-
-def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
-    """Run a job in this process; writes the series, the last snapshot and the record into the folder."""
-    import pandas as pd
-
-    from .device import quiet_warp
-
-    quiet_warp()
-    from .measure.ledger import final_lengths, ledger, lengths
-    from .measure.reference import answers
-    from .measure.tower import is_tower, success
-    from .simulation import Simulation, Verdict
-    from .solver import approximations, get_solver
-
-    scenario = Scenario.model_validate(job.scenario)
-    solver = get_solver(job.method)
-    about = machine(job.target)
-    start = time.perf_counter()
-    simulation = Simulation(scenario, solver, job.target)
-    rows: list[dict[str, float]] = []
-
-    def observe(sim: Simulation, vital: Any) -> None:
-        frame = sim.frame()
-        rows.append(
-            {"time_s": sim.now, "top_speed_m_s": vital.speed, **ledger(frame, scenario), **lengths(frame, scenario)}
-        )
-        if job.keep_frames:
-            save(folder / f"frame_{len(rows) - 1:04d}.npz", frame, sim.now)
-        report({"time": sim.now, "until": scenario.duration, "speed": vital.speed})
-
-    if job.film_every is not None:
-        from .report.film import Film
-
-        simulation.film = Film(folder / "film", job.scenario, job.film_every)
-    outcome = simulation.run(observe, job.wall_limit)
-    if simulation.film is not None:
-        simulation.film.close()
-    frame = simulation.frame()
-    series = pd.DataFrame(rows)
-    series.to_parquet(folder / "series.parquet")
-    save(folder / "final.npz", frame, simulation.now)
-    complete = outcome.verdict is Verdict.COMPLETED
-    final = {**ledger(frame, scenario), **final_lengths(frame, scenario)} if complete else {}
-    record = {
-        "scenario": scenario.name, "method": job.method, **asdict(job.target),
-        "repeat": job.repeat, "seed": scenario.seed, "spacing_m": scenario.spacing,
-        "verdict": str(outcome.verdict), "reason": outcome.reason,
-        "measures": final,
-        "answers": [asdict(a) for a in answers(scenario, series, final)] if complete else [],
-        "success": success(scenario, final, series) if complete and is_tower(scenario) else [],
-        "cost": cost(outcome, simulation, time.perf_counter() - start),
-        "launches": {
-            "per_substep": simulation.substep_launches.count,
-            "process_per_tick": simulation.process_launches.count / max(outcome.ticks, 1),
-        },
-        "bytes": simulation.footprint(),
-        "bounds_s": {b.name: b.dt for b in simulation.bounds()},
-        "binding_s": outcome.binding,
-        "approximations": approximations(solver, scenario, simulation.config),
-        "warnings": scenario.warnings(),
-        "config": simulation.config.model_dump(), "input": scenario.model_dump(mode="json"),
-        "machine": about,
-    }  # fmt: skip
-    write_atomically(folder / RECORD, json.dumps(record, indent=1))
-    return record
-
-
-def save(path: Path, frame: dict[str, Any], time: float) -> None:
-    """A snapshot and its time, written atomically."""
-    import io
-
-    import numpy as np
-
-    buffer = io.BytesIO()
-    np.savez(buffer, time=time, **frame)
-    write_atomically(path, buffer.getvalue())
-
-
-def cost(outcome: Any, simulation: Any, total: float) -> dict[str, float]:
-    """What a run cost, compilation apart; rates are of the loop alone, measurements and output not included."""
-    wall, cpu = max(outcome.wall, 1e-9), max(outcome.cpu, 1e-9)
-    bytes_used = sum(simulation.footprint().values())
-    row = {
-        "simulated_s": outcome.time,
-        "wall_s": outcome.wall,
-        "cpu_s": outcome.cpu,
-        "prepare_s": outcome.prepare_wall,
-        "total_s": total,
-        "substeps": outcome.substeps,
-        "mean_dt_s": outcome.time / max(outcome.substeps, 1),
-        "steps_per_s": outcome.substeps / wall,
-        "particle_substeps_per_s": outcome.particle_substeps / wall,
-        "particle_substeps_per_cpu_s": outcome.particle_substeps / cpu,
-        "wall_per_simulated_s": wall / max(outcome.time, 1e-12),
-        "simulated_to_real": outcome.time / wall,
-        "peak_particles": outcome.peak_particles,
-        "bytes_per_particle": bytes_used / max(simulation.pool.size, 1),
-        "peak_memory_MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-    }
-    if not simulation.scene.device.is_cpu:
-        import warp as wp
-
-        row["peak_device_MiB"] = wp.get_mempool_used_mem_high(simulation.scene.device) / 2**20
-    return row
-
-
-def machine(target: Target) -> dict[str, str]:
-    """What it ran on."""
-    import numpy as np
-    import warp as wp
-
-    device = wp.get_device(target.device)
-    arch = platform.machine() if device.is_cpu else f"sm_{device.arch}"
-    return {
-        "fluidbench": __version__, "python": platform.python_version(), "warp": str(wp.config.version),
-        "backend_version": version(BACKENDS[target.backend]), "arch": arch,
-        "numpy": np.__version__, "platform": platform.platform(), "cores": str(os.cpu_count()),
-        "device": device.name or platform.processor(), "time": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-    }  # fmt: skip
+    return f"its process ended with code {code}: {last}" if code else f"its process left no whole record: {last}"
 
 
 def _end_with_parent() -> None:
@@ -224,17 +186,30 @@ def _end_with_parent() -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def main(folder: Path) -> None:
+def main(arguments: list[str]) -> None:
     """The child's entry point."""
-    _end_with_parent()
+    from .child import perform
+
+    folder = Path(arguments[0])
+    if ATTENDED in arguments[1:]:
+        _end_with_parent()
     table = json.loads((folder / "job.json").read_text())
     job = Job(**table | {"target": Target(**table["target"])})
 
     def report(state: dict[str, Any]) -> None:
         print(PROGRESS + json.dumps(state), flush=True)
 
-    perform(job, folder, report)
+    try:
+        perform(job, folder, report)
+    except UserError as error:
+        write_record(folder, job.heading() | {"verdict": "refused", "reason": " ".join(str(error).splitlines())})
+    except Obstacle as error:
+        print(OBSTACLE + str(error), flush=True)
+        sys.exit(1)
+    except OSError as error:
+        print(f"{OBSTACLE}{error.strerror or error}: {error.filename or folder}", flush=True)
+        sys.exit(1)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(sys.argv[1:])

@@ -9,13 +9,19 @@ from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from .body import CORNERS, Body, Matrix, Model, Vector
+from .body import CORNERS, Body
 from .collider import Collider
-from .material import Material, NonNegative, Positive
+from .errors import quoted
+from .material import Material
+from .model import Matrix, Model, NonNegative, Positive, Vector
 from .toolpath import Toolpath, Track
 
+ADDRESSABLE = 2**26  # particles: neighbour lists keep 26 bits for an index
+RESOLVED = 2**18  # spacings from the origin at which single precision still resolves a 64th of a spacing
+MOST_TICKS, MOST_OUTPUTS = 10**8, 10**6
+LONGEST_NAME = 80
 AGES = 65  # ages at which bounds look at a material that changes
 FACES = ("x_lower", "x_upper", "y_lower", "y_upper", "z_lower", "z_upper")
 
@@ -132,11 +138,29 @@ class Scenario(Model):
     )
     numerics: dict[str, dict[str, Any]] = Field({}, description="per method: overrides of its own numerical settings")
 
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, name: str) -> str:
+        plain = name.isprintable() and not set(name) & set('/\\:*?"<>|') and name == name.strip(" .")
+        if not (plain and 0 < len(name) <= LONGEST_NAME):
+            raise ValueError(
+                f'names a folder: 1 to {LONGEST_NAME} printable characters without / \\ : * ? " < > | and without a '
+                f"blank or a dot at either end (got {quoted(name)})"
+            )
+        return name
+
+    @field_validator("title")
+    @classmethod
+    def _is_a_line(cls, title: str) -> str:
+        if not title.isprintable() or len(title) > 300:
+            raise ValueError(f"is one line of at most 300 printable characters (got {quoted(title)})")
+        return title
+
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
         for check in (
-            self._check_source, self._check_nozzle, self._check_bodies, self._check_periodic, self._check_force,
-            self._check_collider,
+            self._check_source, self._check_size, self._check_time, self._check_nozzle, self._check_bodies,
+            self._check_periodic, self._check_force, self._check_collider,
         ):  # fmt: skip
             check()
         return self
@@ -146,6 +170,46 @@ class Scenario(Model):
             raise ValueError("nozzle and toolpath belong together: give both or neither")
         if self.nozzle is None and not self.bodies:
             raise ValueError("nothing to simulate: give bodies, or a nozzle with a toolpath")
+
+    def _check_size(self) -> None:
+        """Enough room in memory and in single precision, before anything is laid out."""
+        d, domain = self.spacing, self.domain
+        far = max(map(abs, (*domain.lower, *domain.upper)))
+        if far > RESOLVED * d:
+            raise ValueError(
+                f"the domain reaches to {far:.6g} m, {far / d:.3g} spacings from the origin; single precision resolves "
+                f"positions up to {RESOLVED} spacings ({RESOLVED * d:.3g} m): use a larger spacing or a smaller domain"
+            )
+        boxes = [float(np.prod(2.0 * body.extent / d + 1.0)) for body in self.bodies]
+        stream = 0.0
+        if self.nozzle is not None:
+            stream = self.nozzle.rate * self.duration / d**3 + (self.nozzle.diameter / d + 5.0) ** 2
+        expansion = self.material.expansion
+        most = (sum(boxes) + stream) * (1.0 if expansion is None else 2.0 * expansion.ratio)
+        if self.pool is not None and self.pool > ADDRESSABLE:
+            raise ValueError(f"pool = {self.pool:.6g}: {_too_many(self.pool)}")
+        if most > 8.0 * ADDRESSABLE:  # bodies may fill little of their boxes; the exact count is judged later
+            raise ValueError(f"spacing = {d:g} m: bodies and nozzle would be {_too_many(most)}")
+
+    def _check_time(self) -> None:
+        """A number of ticks and outputs that a computer comes to the end of."""
+        outputs = self.duration / min(self.output_interval or self.duration / 20.0, self.duration)
+        if outputs > MOST_OUTPUTS:
+            raise ValueError(
+                f"output_interval = {self.output_interval:g} s makes {outputs:.3g} outputs of {self.duration:g} s; at "
+                f"most {MOST_OUTPUTS} are measured and kept"
+            )
+        ticks = self.duration / (self.tick or 0.25 * self.spacing / self.reference_speed)
+        if ticks > MOST_TICKS:
+            key = (
+                f"tick = {self.tick:g} s"
+                if self.tick
+                else f"spacing = {self.spacing:g} m, {self.reference_speed:.3g} m/s"
+            )
+            raise ValueError(
+                f"duration = {self.duration:g} s at {key} makes {ticks:.3g} ticks of a substep or more; at most "
+                f"{MOST_TICKS} end in a day"
+            )
 
     def _check_nozzle(self) -> None:
         if self.nozzle is None or self.track is None:
@@ -281,7 +345,10 @@ class Scenario(Model):
 
     def made_of(self, material: Material) -> "Scenario":
         """The same scenario as if all its material were this."""
-        return self.model_copy(update={"material": material})
+        made = self.model_copy(update={"material": material})
+        if self.track is not None:
+            vars(made)["track"] = self.track  # no matter of the material, and dear to lay out
+        return made
 
     @cached_property
     def schedule(self) -> tuple[float, int, int]:
@@ -319,3 +386,14 @@ class Scenario(Model):
                 f"({self.reference_speed:.3g} m/s): expect visible compression"
             )
         return out
+
+
+def _too_many(particles: float) -> str:
+    """What a number of particles would take, and what there is."""
+    import psutil
+
+    there = psutil.virtual_memory().available / 2**30
+    return (
+        f"{particles:.3g} particles, at some 300 bytes each {300 * particles / 2**30:.3g} GiB at least; "
+        f"{ADDRESSABLE} can be addressed, and this machine has {there:.3g} GiB left"
+    )

@@ -3,8 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -26,21 +25,14 @@ from .scene import Scene
 from .solver import Demands, Solver, check_backend, configure, get_solver, refusal
 from .target import DEFAULT_BACKEND, HERE, Target
 from .timestep import Bound, Plan, plan
+from .verdict import Verdict
+
+if TYPE_CHECKING:
+    from .checkpoint import Checkpoints
 
 SORT_TICKS = 32  # ticks between reorderings of the pool, at most
 SPEED_MARGIN = 1.25  # the speed seen at the last look may grow by this much until the next
 PACE_SECONDS = 8.0  # wall time after which the pace is judged against the wall limit
-
-
-class Verdict(StrEnum):
-    """How a run ended. Only `completed` carries results to be compared."""
-
-    COMPLETED = "completed"
-    DIVERGED = "diverged"
-    OUT_OF_CAPACITY = "out_of_capacity"
-    TIMEOUT = "timeout"
-    ERROR = "error"
-    REFUSED = "refused"
 
 
 @dataclass
@@ -228,21 +220,51 @@ class Simulation:
         words = [text for bit, text in self.solver.faults.items() if bits & bit]
         return "; ".join(words) if words else None
 
+    def arrays(self) -> dict[str, wp.array]:
+        """Everything on the device that a run must have to go on as it was."""
+        found = {f"pool.{name}": array for name, array in self.pool.fields.items()}
+        found |= {"pool.count": self.pool.count, "pool.fault": self.pool.fault}
+        return found | {f"solver.{name}": array for name, array in self.solver.carried().items()}
+
+    def progress(self) -> dict[str, Any]:
+        """Everything on the host that a run must have to go on as it was, as JSON can hold it."""
+        found: dict[str, Any] = {"done": self.done, "speed": self.speed, "counts": self.pool.counts,
+                                 "stale": bool(self.pool.stale), "laying": self.laying.progress()}  # fmt: skip
+        return found | ({"emission": self.emission.progress()} if self.emission is not None else {})
+
+    def go_on(self, progress: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
+        """Take the place of a run whose `progress` and `arrays` were kept; raises KeyError if one is not there."""
+        for name, array in self.arrays().items():
+            array.assign(arrays[name])
+        self.done, self.speed = progress["done"], progress["speed"]
+        self.pool.counts, self.pool.stale = list(progress["counts"]), progress["stale"]
+        self.laying.go_on(progress["laying"])
+        if self.emission is not None:
+            self.emission.go_on(progress["emission"])
+        self.solver.resume()
+
     def run(
-        self, observe: Callable[["Simulation", Vital], None] | None = None, wall_limit: float | None = None
+        self,
+        observe: Callable[["Simulation", Vital], None] | None = None,
+        wall_limit: float | None = None,
+        checkpoints: "Checkpoints | None" = None,
     ) -> Outcome:
-        """Run to the end, or until something breaks; `observe` is called at every output, off the clock."""
+        """Run to the end, or until something breaks; `observe` is called at every output, and checkpoints are written,
+        off the clock. Goes on from a checkpoint where there is one."""
         outcome = Outcome(Verdict.COMPLETED)
         start = time.perf_counter()
         self.prepare()
         outcome.prepare_wall = time.perf_counter() - start
         every = 1 if self.scene.device.is_cpu else min(8, self.ticks_per_output)
-        if observe is not None:
+        going_on = checkpoints is not None and checkpoints.restore(outcome)
+        if observe is not None and not going_on:
             self._age()
             self._refresh()
             observe(self, self.look())
         while self.done < self.ticks and outcome.verdict is Verdict.COMPLETED:
             self._tick(outcome, every, observe, wall_limit)
+            if checkpoints is not None and outcome.verdict is Verdict.COMPLETED and checkpoints.due():
+                checkpoints.write(outcome)
         self._conclude(outcome)
         return outcome
 

@@ -12,9 +12,10 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
-from .errors import UserError, suggestion
+from .errors import UserError, quoted, suggestion
+from .model import Model
 from .timestep import lost_speed
 
 if TYPE_CHECKING:
@@ -42,10 +43,8 @@ class Feature(Enum):
     EXPANSION = "rest volumes that grow"
 
 
-class Config(BaseModel):
+class Config(Model):
     """A method's own numerical settings; frozen, unknown keys refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Solver(ABC):
@@ -97,6 +96,13 @@ class Solver(ABC):
     def refresh(self) -> None:  # noqa: B027
         """Called between substeps, outside any graph, after particles appeared, moved in memory or were moved."""
 
+    def carried(self) -> dict[str, Any]:
+        """Arrays beyond the pool's that later substeps depend on, by name: what a checkpoint must hold."""
+        return {}
+
+    def resume(self) -> None:  # noqa: B027
+        """Called after the pool and what is `carried` were restored from a checkpoint, before the next substep."""
+
     def harden(self, due: Any) -> None:
         """Move every particle to its due row of the phase table (int, shape (worlds * capacity,)), between substeps.
 
@@ -138,7 +144,7 @@ def get_solver(name: str) -> type[Solver]:
     """The method registered under this name; raises UserError with the nearest known name."""
     for point in entry_points(group=ENTRY_POINTS, name=name):
         return point.load()
-    raise UserError(f"no solver named '{name}'{suggestion(name, solver_names())}")
+    raise UserError(f"no solver named {quoted(name)}{suggestion(name, solver_names())}")
 
 
 def check_backend(solver: type[Solver], target: Target) -> None:
@@ -212,4 +218,14 @@ def configure(solver: type[Solver], scenario: Scenario) -> Any:
             raise UserError(
                 f"numerics.{solver.name}: unknown key '{key}'{suggestion(key, solver.Config.model_fields)}"
             ) from None
-        raise UserError(f"numerics.{solver.name}.{key}: {item['msg']} (got {item['input']!r})") from None
+        words = item["msg"].removeprefix("Value error, ")
+        raise UserError(f"numerics.{solver.name}.{key}: {words} (got {quoted(item['input'])})") from None
+
+
+def check_numerics(scenario: Scenario) -> None:
+    """Raise UserError for a section of `numerics` that no method reads, or that its method refuses."""
+    names = solver_names()
+    for name in scenario.numerics:
+        if name not in names:
+            raise UserError(f"numerics.{quoted(name)[1:-1]}: no method of that name{suggestion(name, names)}")
+        configure(get_solver(name), scenario)

@@ -1,55 +1,164 @@
-"""Results on disk: one folder a run, written atomically, found again by what went into it."""
+"""Results on disk: one folder a run, written atomically, found again by what went into it, trusted only if whole."""
 
 import hashlib
 import json
 import os
 import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from . import __version__
-from .errors import UserError
+from .errors import Obstacle, UserError
 
-RECORD = "record.json"
-FINAL = {"completed", "diverged", "out_of_capacity", "refused"}  # verdicts that another attempt would not change
+if TYPE_CHECKING:
+    import pandas as pd
+
+RECORD, SEAL, CLAIM = "record.json", "seal", ".claim"
+PART = ".part"
 
 
-def key_of(inputs: dict[str, Any]) -> str:
-    """Ten characters that name a run by its inputs and the package version."""
-    text = json.dumps({**inputs, "version": __version__}, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:10]
+def key_of(inputs: Mapping[str, Any]) -> str:
+    """Ten characters that name a run by its inputs."""
+    return hashlib.sha256(_canonical(inputs)).hexdigest()[:10]
+
+
+def _canonical(table: Mapping[str, Any]) -> bytes:
+    return json.dumps(table, sort_keys=True, default=str).encode()
 
 
 def write_atomically(path: Path, data: bytes | str) -> None:
-    """Write beside the target, then rename: a reader sees the old file or the whole new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    with os.fdopen(handle, "wb") as file:
-        file.write(data.encode() if isinstance(data, str) else data)
-    Path(name).replace(path)
+    """Write beside the target, then rename: a reader sees the old file or the whole new one.
+
+    Raises Obstacle where the system will not have it; nothing is left behind then.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}{PART}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(data.encode() if isinstance(data, str) else data)
+        part.replace(path)
+    except OSError as error:
+        remove_quietly(part)
+        raise Obstacle(f"cannot write {path}: {error.strerror}") from None
+    except BaseException:
+        remove_quietly(part)
+        raise
+
+
+def remove_quietly(path: Path) -> None:
+    """Remove a file that may not be there, on a disk that may not answer."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return
+
+
+def write_parquet(path: Path, table: "pd.DataFrame") -> None:
+    """A table as parquet, written atomically."""
+    import io
+
+    buffer = io.BytesIO()
+    table.to_parquet(buffer)
+    write_atomically(path, buffer.getvalue())
+
+
+def seal(record: Mapping[str, Any]) -> str:
+    """What a record's content sums to: a record that was edited, or torn, does not match its seal."""
+    return hashlib.sha256(_canonical({k: v for k, v in record.items() if k != SEAL})).hexdigest()
+
+
+def write_record(
+    folder: Path, record: dict[str, Any], files: Iterable[Path] = (), name: str = RECORD
+) -> dict[str, Any]:
+    """Seal a record with the sums of the files that belong to it, write it, and return it as a reader will see it."""
+    record = json.loads(json.dumps(record | {"files": {path.name: digest(path) for path in files}}))
+    record[SEAL] = seal(record)
+    write_atomically(folder / name, json.dumps(record, indent=1))
+    return record
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def read_record(folder: Path, name: str = RECORD) -> tuple[dict[str, Any] | None, str]:
+    """(record, "") of a folder; (None, why not) where it is missing, torn or edited, or a file of it is."""
+    path = folder / name
+    if not path.exists():
+        return None, ""
+    try:
+        record = json.loads(path.read_text())
+        whole = isinstance(record, dict) and record.get(SEAL) == seal(record) and isinstance(record.get("files"), dict)
+    except (OSError, ValueError, RecursionError):
+        return None, f"{name} cannot be read"
+    if not whole:
+        return None, f"{name} is not as it was written"
+    for file, expected in record["files"].items():
+        try:
+            if digest(folder / file) != expected:
+                return None, f"{file} is not as it was written"
+        except OSError:
+            return None, f"{file} cannot be read" if (folder / file).exists() else f"{file} is missing"
+    return record, ""
 
 
 class Store:
-    """The output folder of a study."""
+    """The output folder of a study; it comes into being with the first result.
 
-    def __init__(self, root: Path) -> None:
-        self.root = root
+    With `fresh` nothing that was there before is reused.
+    """
+
+    def __init__(self, root: Path, fresh: bool = False) -> None:
+        self.root, self.fresh = root, fresh
+        self.made: set[Path] = set()  # folders of runs that were made on this store's behalf
         try:
-            root.mkdir(parents=True, exist_ok=True)
-            probe = tempfile.NamedTemporaryFile(dir=root)  # noqa: SIM115
-            probe.close()
-        except OSError as error:
-            raise UserError(
-                f"cannot write to the output folder {root}: {error.strerror}; choose another with --out"
-            ) from None
+            _try_to_write(root)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise UserError(f"cannot write to the output folder {root}: {reason}; choose another with --out") from None
 
-    def folder(self, name: str, inputs: dict[str, Any]) -> Path:
+    def folder(self, name: str, inputs: Mapping[str, Any]) -> Path:
         return self.root / "runs" / f"{name}-{key_of(inputs)}"
 
-    def record(self, folder: Path) -> dict[str, Any] | None:
-        """The record of a run that need not be repeated; None when there is none."""
-        path = folder / RECORD
-        if not path.is_file():
-            return None
-        record = json.loads(path.read_text())
-        return record if record["verdict"] in FINAL else None
+    def record(
+        self, folder: Path, misfit: Callable[[dict[str, Any]], str], name: str = RECORD
+    ) -> tuple[dict[str, Any] | None, str]:
+        """(a record that serves, ""), or (None, why what is there does not); `misfit` says why a whole one does not."""
+        if self.fresh and folder not in self.made:
+            return None, ""
+        record, why = read_record(folder, name)
+        if record is not None and (why := misfit(record)):
+            return None, why
+        return record, why
+
+
+def _try_to_write(root: Path) -> None:
+    """Write, and remove, a file where the folder is or would be; raises OSError where that cannot be."""
+    there = root
+    while not there.exists():
+        there = there.parent
+    if not there.is_dir():
+        raise NotADirectoryError(20, "Not a directory")
+    tempfile.NamedTemporaryFile(dir=there).close()
+    if there != root and len(root.name.encode()) > 255:
+        raise OSError(36, "File name too long")
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Hold a run's folder: of two studies that want the same run the second waits, and finds it finished."""
+    from filelock import FileLock
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(folder / CLAIM)
+        lock.acquire()
+    except OSError as error:
+        raise Obstacle(f"cannot write to {folder}: {error.strerror}") from None
+    try:
+        for part in folder.glob(f".*{PART}"):  # of somebody who was killed
+            remove_quietly(part)
+        yield
+    finally:
+        lock.release()

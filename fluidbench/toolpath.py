@@ -4,18 +4,21 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from .material import NonNegative, Positive
+from .model import Model, NonNegative, Positive
 
 Point = tuple[float, float]
+USERS = {
+    "start": ("line", "wall"), "end": ("line", "wall"), "points": ("polyline",), "center": ("ring",),
+    "radius": ("ring",),
+}  # fmt: skip
+"""Keys that only some shapes use."""
 RING_CHORDS = 180  # a ring is travelled as a polygon of this many chords; its radius errs by 1.5e-4
 
 
-class Toolpath(BaseModel):
+class Toolpath(Model):
     """The path of the nozzle axis in plan, repeated for every layer; an open path is travelled back and forth."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["line", "polyline", "ring", "wall"] = Field("line", description="shape of one layer")
     start: Point | None = Field(None, description="line, wall: first point (x, y) [m]")
@@ -33,6 +36,7 @@ class Toolpath(BaseModel):
 
     @model_validator(mode="after")
     def _complete(self) -> "Toolpath":
+        self.refuse_idle(self.kind, USERS)
         needs = {"line": ("start",), "wall": ("start", "end"), "polyline": ("points",), "ring": ("center", "radius")}
         missing = [key for key in needs[self.kind] if getattr(self, key) is None]
         if missing:
@@ -41,6 +45,10 @@ class Toolpath(BaseModel):
             raise ValueError("more than one layer needs layer_height")
         if self.speed == 0 and self.dwell is None:
             raise ValueError("a fixed nozzle (speed = 0) needs dwell, the time it extrudes")
+        if self.speed > 0 and self.dwell is not None:
+            raise ValueError("dwell has no effect on a nozzle that moves (speed > 0); did you mean 'pause'?")
+        if self.points is not None and len(self.points) < (2 if self.speed > 0 else 1):
+            raise ValueError(f"a polyline needs at least two points, got {len(self.points)}")
         if self.speed > 0 and self.length() == 0:
             raise ValueError("the path has no length; give end, or speed = 0 with dwell")
         return self

@@ -324,6 +324,10 @@ class Neighbours:
             [self.entries, self.number, self.listed, pool.fault, self.outdated],
         )  # fmt: skip
 
+    def carried(self) -> dict[str, wp.array]:
+        """The lists as they are: made anew, they would be summed over in another order."""
+        return {name: getattr(self, name) for name in ("entries", "number", "listed", "outdated")}
+
     def footprint(self) -> dict[str, int]:
         return {"neighbour lists": self.entries.capacity + self.number.capacity + self.listed.capacity}
 

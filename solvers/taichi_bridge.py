@@ -101,8 +101,7 @@ def is_solid(phase):
 
 @ti.func
 def beyond(x, limit):
-    """Whether |x| exceeds a positive limit, or is not a number: by its bits, since Taichi's comparisons of floats assume
-    that there are none that are not numbers."""
+    """Whether |x| exceeds a positive limit or is no number: by its bits, for Taichi compares as if all were numbers."""
     return (ti.bit_cast(ti.cast(x, ti.f32), ti.i32) & 0x7FFFFFFF) > ti.bit_cast(ti.cast(limit, ti.f32), ti.i32)
 
 

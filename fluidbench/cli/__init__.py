@@ -1,23 +1,62 @@
 """The command line: parses, calls a study, prints. Heavy imports stay inside the commands."""
 
+import signal
 import sys
+from typing import NoReturn
 
-from ..errors import UserError
+import typer
+
+from ..errors import Interrupted, Obstacle, UserError
 
 from . import runs, studies, pictures, info  # isort: skip  (the order of the verbs in --help)
 from .app import app
 
 __all__ = ["app", "info", "main", "pictures", "runs", "studies"]
+USAGE = typer.BadParameter.__base__  # what the parser raises; its module differs between versions
+MOST_LINES = 6
 
 
 def main() -> None:
-    """Entry point: user errors are one line and exit code 2, an interruption can be resumed."""
+    """Entry point: a user's mistake is a line and exit code 2, an obstacle a line and 1; what was cut off resumes."""
+    if hasattr(signal, "SIGTERM"):
+        signal.signal(signal.SIGTERM, _terminated)
     try:
-        app(standalone_mode=True)
+        sys.exit(app(standalone_mode=False) or 0)
     except UserError as error:
-        for line in str(error).splitlines():
-            print(f"fluidbench: {line}", file=sys.stderr)
+        _leave(2, *str(error).splitlines()[:MOST_LINES])
+    except Obstacle as error:
+        _leave(1, f"{error}; what is finished stays, the same command resumes")
+    except KeyboardInterrupt as error:
+        finished = f": {error}" if isinstance(error, Interrupted) else ""
+        _leave(130, f"interrupted{finished}; the same command resumes with what is not")
+    except BrokenPipeError:  # whoever read our output has gone
+        sys.stderr.close()
+        sys.exit(1)
+    except OSError as error:
+        where = f": {error.filename}" if error.filename else ""
+        _leave(1, f"{error.strerror or error}{where}; what is finished stays, the same command resumes")
+    except Exception as error:
+        if not isinstance(error, USAGE or ()):
+            raise
+        _misused(error)
+
+
+def _terminated(*_: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _misused(error: Exception) -> NoReturn:
+    """Help where a command was given nothing at all; otherwise what the parser says, in one line."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()  # type: ignore[attr-defined]
         sys.exit(2)
-    except KeyboardInterrupt:
-        print("fluidbench: interrupted; the same command resumes with what is not finished", file=sys.stderr)
-        sys.exit(130)
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "fluidbench"
+    words = " ".join(error.format_message().split())  # type: ignore[attr-defined]
+    _leave(2, f"{words[:300]} (see `{command} --help`)")
+
+
+def _leave(code: int, *lines: str) -> NoReturn:
+    for line in lines:
+        print(f"fluidbench: {line}", file=sys.stderr)
+    sys.exit(code)

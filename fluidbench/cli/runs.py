@@ -8,19 +8,27 @@ import typer
 
 from .app import (
     Backend,
+    Checkpoint,
     Device,
     Film,
     Frames,
+    Fresh,
     Out,
     ScenarioName,
     Settings,
+    Solvers,
     Spacing,
     Threads,
     WallLimit,
     app,
     load_scenario,
+    methods_of,
+    names_in,
     one_target,
-    split,
+    positive,
+    repeats_of,
+    seconds,
+    store_in,
     targets_of,
     workers_for,
 )
@@ -34,7 +42,7 @@ Quick = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter
 @app.command()
 def compare(
     scenario: ScenarioName,
-    solvers: Annotated[str, typer.Option(help="methods, separated by commas; default all that are installed")] = "",
+    solvers: Solvers = None,
     set_: Settings = None,
     spacing: Spacing = None,
     repeats: Annotated[int, typer.Option(min=1, help="runs of each method, for the spread of the cost")] = 1,
@@ -46,24 +54,17 @@ def compare(
     frames: Frames = False,
     quick: Quick = False,
     render_every: Film = None,
+    fresh: Fresh = False,
+    checkpoint_every: Checkpoint = 300.0,
 ) -> None:
     """Run one scenario through several methods and put fidelity and cost side by side.
 
     A second call with the same inputs reuses the runs that are finished.
     """
-    _study(
-        scenario,
-        solvers,
-        set_,
-        spacing,
-        repeats,
-        (device, backend, threads),
-        out,
-        wall_limit,
-        frames,
-        quick,
-        render_every,
-    )
+    resolved = load_scenario(scenario, set_, spacing, quick)
+    methods, targets = methods_of(solvers), targets_of(device, backend, threads)
+    watched = _watched(wall_limit, frames, render_every, checkpoint_every)
+    _study(resolved, methods, repeats_of(repeats), targets, watched, out, fresh, "compare")
 
 
 @app.command()
@@ -80,15 +81,32 @@ def run(
     frames: Frames = False,
     quick: Quick = False,
     render_every: Film = None,
+    fresh: Fresh = False,
+    checkpoint_every: Checkpoint = 300.0,
 ) -> None:
     """Run one scenario through one method."""
-    _study(scenario, solver, set_, spacing, 1, (device, backend, threads), out, wall_limit, frames, quick, render_every)
+    from ..solver import get_solver
+
+    resolved, target = load_scenario(scenario, set_, spacing, quick), one_target(device, backend, threads)
+    get_solver(solver)
+    watched = _watched(wall_limit, frames, render_every, checkpoint_every)
+    label = f"run-{solver}" + (f"-{backend}" if target.suffix else "")
+    _study(resolved, [solver], 1, [target], watched, out, fresh, label)
+
+
+def _watched(wall_limit: float, frames: bool, render_every: float | None, checkpoint_every: float) -> dict[str, Any]:
+    """How runs are watched, as a Job says it; raises UserError for times that are none."""
+    return {
+        "wall_limit": seconds(wall_limit, "--wall-limit"), "keep_frames": frames,
+        "film_every": None if render_every is None else positive(render_every, "--render-every"),
+        "checkpoint_every": seconds(checkpoint_every, "--checkpoint-every", zero=True),
+    }  # fmt: skip
 
 
 @app.command()
 def validate(
     cases: Annotated[list[str] | None, typer.Argument(help="cases (see `fluidbench list`); default all")] = None,
-    solvers: Annotated[str, typer.Option(help="methods, separated by commas; default all that are installed")] = "",
+    solvers: Solvers = None,
     levels: Annotated[str, typer.Option(help="spacings: rough, coarse, medium, fine (1.5, 1, 2/3, 1/2)")] = "coarse",
     quick: Annotated[bool, typer.Option("--quick", help="a few minutes: the cheap cases, every physics")] = False,
     device: Device = "cpu",
@@ -97,6 +115,7 @@ def validate(
     out: Out = None,
     wall_limit: WallLimit = 1800.0,
     jobs: Annotated[int | None, typer.Option(min=1, help="runs at a time; default 2, or 1 on CUDA")] = None,
+    fresh: Fresh = False,
 ) -> None:
     """Run cases with known answers through every method: error, observed order and cost beside the tolerance.
 
@@ -105,18 +124,19 @@ def validate(
     from rich.console import Console
 
     from ..report.validation import present
-    from ..solver import check_backend, get_solver, solver_names
-    from ..store import Store
+    from ..solver import check_backend, get_solver
     from ..study.case import select
     from ..study.validate import plan
 
-    methods = split(solvers) or solver_names()
-    target = one_target(device, backend, threads)
+    methods, target = methods_of(solvers), one_target(device, backend, threads)
     for method in methods:
         check_backend(get_solver(method), target)
-    trials = plan(select(cases or []), methods, split(levels), quick, target, wall_limit)
-    store = Store((out or Path("fluidbench-out") / "validate").resolve())
-    _validate(trials, store, workers_for(jobs, target), Console(stderr=True))
+    limit, workers = seconds(wall_limit, "--wall-limit"), workers_for(jobs, target)
+    if cases:
+        names_in(",".join(cases), "CASES", "case")
+    trials = plan(select(cases or []), methods, names_in(levels, "--levels", "level"), quick, target, limit)
+    store = store_in(out, "validate", fresh)
+    _validate(trials, store, workers, Console(stderr=True))
     if not present(trials, store.root, Console(width=None if sys.stdout.isatty() else 120)):
         raise typer.Exit(1)
 
@@ -152,28 +172,33 @@ def _validate(trials: list[Any], store: Any, workers: int, console: Any) -> None
 
 
 def _study(
-    name: str, solvers: str, settings: list[str] | None, spacing: float | None, repeats: int,
-    where: tuple[str, str, int], out: Path | None, wall_limit: float, frames: bool, quick: bool,
-    film_every: float | None,
+    scenario: Any, methods: list[str], repeats: int, targets: list[Any], watched: dict[str, Any], out: Path | None,
+    fresh: bool, label: str,
 ) -> None:  # fmt: skip
     """compare and run: everything is checked before anything is written."""
     from rich.console import Console
 
-    from ..solver import solver_names
-    from ..store import Store
+    from ..report.compare import publish
     from ..study.compare import jobs
+    from ..verdict import lacking
 
-    scenario = load_scenario(name, settings, spacing, quick)
-    methods = split(solvers) or solver_names()
-    planned = jobs(scenario, methods, repeats, targets_of(*where), wall_limit, frames, film_every)
+    planned = jobs(scenario, methods, repeats, targets, **watched)
+    store = store_in(out, scenario.name, fresh)
     console, errors = Console(), Console(stderr=True)
     for warning in scenario.warnings():
         errors.print(f"warning: {warning}", markup=False, highlight=False)
-    store = Store((out or Path("fluidbench-out") / scenario.name).resolve())
     results = _run_all(planned, store, errors)
-    _present(results, store.root, console)
-    if not any(r.ok for r in results):
+    publish(results, store.root, console, label)
+    _tell_reused(results, errors)
+    if not any(r.ok for r in results) or lacking(results, refusals=False):
         raise typer.Exit(1)
+
+
+def _tell_reused(results: list["Finished"], console: Any) -> None:
+    """Which runs are of an earlier call, and of when."""
+    old = [f"{r.label} ({r.record.get('machine', {}).get('time', 'no time')})" for r in results if r.reused]
+    if old:
+        console.print(f"reused: {', '.join(old)}; --fresh runs them again", markup=False, highlight=False)
 
 
 def _run_all(planned: list[Any], store: Any, console: Any) -> list["Finished"]:
@@ -195,35 +220,6 @@ def _run_all(planned: list[Any], store: Any, console: Any) -> list["Finished"]:
             progress.update(tasks[i], completed=state["time"] / state["until"], state=text)
 
         def ended(i: int, result: "Finished") -> None:
-            progress.update(tasks[i], completed=1.0, state=result.record["verdict"])
+            progress.update(tasks[i], completed=1.0, state=result.verdict)
 
         return execute(planned, store, Hooks(started, step, ended))
-
-
-def _present(results: list["Finished"], root: Path, console: Any) -> None:
-    """Tables in the terminal; figures, tables and the page in the folder."""
-    from ..report.figures import draw, draw_views
-    from ..report.html import write_page
-    from ..report.tables import against_reference, backends, costs, fidelity, successes
-    from ..report.tables import show as print_table
-    from ..report.traces import plots
-    from ..study.compare import tidy, write_tables
-    from ..study.execute import ADVICE
-
-    write_tables(tidy(results), root)
-    made = (fidelity(results), successes(results), against_reference(results), costs(results), backends(results))
-    tables = [table for table in made if table is not None]
-    drawn = plots(results)
-    views = draw_views(results, root)
-    for plot in drawn:
-        draw(plot, root)
-    page = write_page(results, tables, drawn, views, root)
-    for table in tables:
-        print_table(console, table)
-    for result in results:
-        if not result.ok:
-            verdict = result.record["verdict"]
-            console.print(
-                f"{result.label}: {verdict}: {result.record['reason']}; {ADVICE.get(verdict, '')}", markup=False
-            )
-    console.print(f"report: {page}", markup=False, highlight=False, soft_wrap=True)

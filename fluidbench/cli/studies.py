@@ -9,9 +9,11 @@ import typer
 from .app import (
     Backend,
     Device,
+    Fresh,
     Out,
     ScenarioName,
     Settings,
+    Solvers,
     Spacing,
     Threads,
     WallLimit,
@@ -20,8 +22,12 @@ from .app import (
     count_of,
     fraction,
     load_scenario,
+    methods_of,
+    names_in,
     one_target,
-    split,
+    repeats_of,
+    seconds,
+    store_in,
     workers_for,
 )
 
@@ -29,7 +35,6 @@ if TYPE_CHECKING:
     from ..store import Store
     from ..target import Target
 
-Solvers = Annotated[str, typer.Option(help="methods, separated by commas; default all that are installed")]
 Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="experiments at a time; default 2, or 1 on CUDA")]
 
@@ -37,10 +42,10 @@ Jobs = Annotated[int | None, typer.Option(min=1, help="experiments at a time; de
 @app.command()
 def stability(
     scenario: ScenarioName = "line_bead",
-    axis: Annotated[str, typer.Option(help="axes, separated by commas; default all: viscosity, youngs_modulus, "
-                                      "poisson_ratio, yield_stress, exit_speed, density, spacing, "
-                                      "particles_per_cell")] = "",
-    solvers: Solvers = "",
+    axis: Annotated[str | None, typer.Option(help="axes, separated by commas; default all: viscosity, youngs_modulus, "
+                                             "poisson_ratio, yield_stress, exit_speed, density, spacing, "
+                                             "particles_per_cell")] = None,
+    solvers: Solvers = None,
     set_: Settings = None,
     spacing: Spacing = None,
     quick: Quick = False,
@@ -49,6 +54,7 @@ def stability(
     threads: Threads = 1,
     out: Out = None,
     jobs: Jobs = None,
+    fresh: Fresh = False,
 ) -> None:  # fmt: skip
     """Find the largest stable time step along material and numerical axes, beside each method's bound and theory.
 
@@ -56,38 +62,46 @@ def stability(
     """
     from ..report.stability import report
     from ..study.case import select
-    from ..study.experiments import run_tasks
-    from ..study.stability import block_tasks, choose, measure_block, measure_point, point_tasks
+    from ..study.stability import HELD, REFUSED, block_tasks, choose, measure_blocks, measure_points, point_tasks
 
-    resolved, axes = load_scenario(scenario, set_, spacing), choose(split(axis))
+    resolved = load_scenario(scenario, set_, spacing)
+    axes = choose([] if axis is None else names_in(axis, "--axis", "axis"))
     target = one_target(device, backend, threads)
-    methods, store, workers = _prepare(solvers, target, out, "stability", jobs)
+    methods, store, workers = _prepare(solvers, target, out, "stability", jobs, fresh)
     blocks = block_tasks(methods, quick, target)
     points = point_tasks(resolved, axes, methods, quick, target)
     stiffness = select(["pbd_stiffness"]) if "pbd" in methods and target.device == "cpu" else []
     with _watch("stability", len(blocks) + len(points)) as tell:
-        measured = run_tasks(blocks, measure_block, store, workers, lambda i, _: tell(blocks[i][0]))
-        rows = run_tasks(points, measure_point, store, workers, lambda i, r: tell(f"{points[i][0]} {r.get('verdict')}"))
+        measured = measure_blocks(blocks, store, workers, lambda i, _: tell(blocks[i][0]))
+        rows = measure_points(points, store, workers, lambda i, r: tell(f"{points[i][0]} {r['verdict']}"))
     trials = _judged(stiffness, ["pbd"], target, store, workers)
     _publish(report(resolved, rows, measured, trials), store.root)
-    if any(row.get("verdict") not in ("held", "refused") for row in rows):
+    if any(row["verdict"] not in (HELD, REFUSED) for row in rows) or any("reason" in block for block in measured):
         raise typer.Exit(1)
 
 
 def _prepare(
-    solvers: str, target: "Target", out: Path | None, verb: str, jobs: int | None
+    solvers: str | None, target: "Target", out: Path | None, verb: str, jobs: int | None, fresh: bool
 ) -> "tuple[list[str], Store, int]":
     """Methods, output folder and number of workers; everything is checked before anything is written."""
     from ..device import quiet_warp
-    from ..solver import check_backend, get_solver, solver_names
-    from ..store import Store
+    from ..solver import check_backend, get_solver
 
     quiet_warp()
-    methods = split(solvers) or solver_names()
+    methods, workers = methods_of(solvers), workers_for(jobs, target)
     for method in methods:
         check_backend(get_solver(method), target)
-    store = Store((out or Path("fluidbench-out") / verb).resolve())
-    return methods, store, workers_for(jobs, target)
+    return methods, store_in(out, verb, fresh), workers
+
+
+def _end_with(missing: list[str]) -> None:
+    """Name the runs that a study lacks, and end with a status that says so."""
+    import sys
+
+    for line in missing:
+        print(f"fluidbench: lacking: {line}", file=sys.stderr)
+    if missing:
+        raise typer.Exit(1)
 
 
 def _judged(cases: list[Any], methods: list[str], target: "Target", store: "Store", workers: int) -> list[Any]:
@@ -132,7 +146,7 @@ def _publish(report: Any, root: Path) -> None:
 @app.command()
 def ablate(
     scenario: ScenarioName,
-    solvers: Solvers = "",
+    solvers: Solvers = None,
     tolerance: Annotated[str, typer.Option(help="how far a length may move, e.g. 5%")] = "5%",
     set_: Settings = None,
     spacing: Spacing = None,
@@ -142,6 +156,7 @@ def ablate(
     out: Out = None,
     wall_limit: WallLimit = 900.0,
     jobs: Jobs = None,
+    fresh: Fresh = False,
 ) -> None:
     """Switch physical features off and numerical economies on, one at a time: what moves, what is saved.
 
@@ -154,21 +169,23 @@ def ablate(
 
     resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
     target = one_target(device, backend, threads)
-    methods, store, workers = _prepare(solvers, target, out, "ablate", jobs)
+    limit = seconds(wall_limit, "--wall-limit")
+    methods, store, workers = _prepare(solvers, target, out, "ablate", jobs, fresh)
     total = len(methods) + sum(len(methods) if c.method is None else 1 for c in changes(resolved, methods))
     with _watch("ablate", total) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        done = study(resolved, methods, share, store, hooks, workers, target, wall_limit)
+        done = study(resolved, methods, share, store, hooks, workers, target, limit)
     given = [*(set_ or []), *([f"spacing={spacing!r}"] if spacing is not None else [])]
     _publish(report(resolved, scenario, given, done, share, store.root), store.root)
+    _end_with(done.missing())
 
 
 @app.command()
 def select(
     scenario: ScenarioName,
     tolerance: Annotated[str, typer.Option(help="largest relative error of any length, e.g. 5%")] = "5%",
-    budget: Annotated[str, typer.Option(help="wall time of a run, e.g. 60s, or realtime; default none")] = "",
-    solvers: Solvers = "",
+    budget: Annotated[str | None, typer.Option(help="wall time of a run, e.g. 60s, or realtime; default none")] = None,
+    solvers: Solvers = None,
     set_: Settings = None,
     spacing: Spacing = None,
     device: Device = "cpu",
@@ -176,6 +193,7 @@ def select(
     threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 900.0,
+    fresh: Fresh = False,
 ) -> None:
     """Recommend a method, spacing and time step: least cost within a tolerance, on this machine, with the evidence.
 
@@ -187,13 +205,15 @@ def select(
     from ..study.select import select as study
 
     resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
-    seconds, pace = budget_of(budget)
+    longest, pace = budget_of(budget)
     target = one_target(device, backend, threads)
-    methods, store, _ = _prepare(solvers, target, out, f"select-{resolved.name}", 1)
+    limit = seconds(wall_limit, "--wall-limit")
+    methods, store, _ = _prepare(solvers, target, out, f"select-{resolved.name}", 1, fresh)
     with _watch("select", len(methods) * len(FACTORS)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        chosen = study(resolved, methods, store, hooks, target, wall_limit)
-    _publish(report(resolved, scenario, chosen, share, seconds, pace, store.root), store.root)
+        chosen = study(resolved, methods, store, hooks, target, limit)
+    _publish(report(resolved, scenario, chosen, share, longest, pace, store.root), store.root)
+    _end_with(chosen.missing())
     if not chosen.candidates:
         raise typer.Exit(1)
 
@@ -211,6 +231,7 @@ def table1(
     out: Out = None,
     wall_limit: WallLimit = 1800.0,
     jobs: Jobs = None,
+    fresh: Fresh = False,
 ) -> None:
     """Judge the published table of adjectives: every cell beside a measured number and a verdict computed by a rule.
 
@@ -225,10 +246,11 @@ def table1(
     resolved = load_scenario(scenario, set_, spacing)
     resolved = load_scenario(scenario, set_, coarser * resolved.spacing)
     target = one_target(device, backend, threads)
-    methods, store, workers = _prepare(",".join(METHODS), target, out, "table1", jobs)
+    limit, repeats = seconds(wall_limit, "--wall-limit"), repeats_of(repeats)
+    methods, store, workers = _prepare(",".join(METHODS), target, out, "table1", jobs, fresh)
 
     def known_answers(chosen: list[Any], where: "Target") -> list[Any]:
-        trials = [t for c in chosen for t in plan([c], methods, levels_of(c, quick), False, where, wall_limit)]
+        trials = [t for c in chosen for t in plan([c], methods, levels_of(c, quick), False, where, limit)]
         with _watch(f"known answers{where.suffix}", len(trials)) as tell:
             none = lambda *_: None  # noqa: E731
             run(trials, store, workers, none, none, none, lambda t: tell(f"{t.case.name} {t.method} {t.verdict}"))
@@ -240,9 +262,10 @@ def table1(
         others = known_answers([case for case in chosen_cases(quick) if case.name in COST_CASES], target.other)
     with _watch("the scenario", planned(repeats, target)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, target, wall_limit)
+        evidence = gather(resolved, trials, repeats, quick, store, hooks, workers, target, limit)
     evidence.other_trials = others
     _publish(report(evidence, store.root), store.root)
+    _end_with(evidence.missing())
 
 
 @app.command()
@@ -256,6 +279,7 @@ def table2(
     threads: Threads = 1,
     out: Out = None,
     wall_limit: WallLimit = 1800.0,
+    fresh: Fresh = False,
 ) -> None:
     """Time the printed tower, feature by feature, with and without pictures; the paper's claims as verdicts.
 
@@ -263,13 +287,16 @@ def table2(
     """
     from ..report.table2 import report
     from ..study.execute import Hooks
-    from ..study.table2 import VARIANTS
+    from ..study.table2 import VARIANTS, check_pools
     from ..study.table2 import table2 as study
 
     target = one_target(device, backend, threads)
-    methods, store, _ = _prepare(solvers, target, out, "table2", 1)
-    sizes = [None if part == "fit" else count_of(part, "--pools") for part in split(pools)]
+    limit, repeats = seconds(wall_limit, "--wall-limit"), repeats_of(repeats)
+    sizes = [None if part == "fit" else count_of(part, "--pools") for part in names_in(pools, "--pools", "pool")]
+    check_pools(sizes, quick)
+    methods, store, _ = _prepare(solvers, target, out, "table2", 1, fresh)
     with _watch("table2", 2 * repeats * len(VARIANTS) * len(methods) * len(sizes)) as tell:
         hooks = Hooks(lambda *_: None, lambda *_: None, lambda _, r: tell(f"{r.label} {r.record['verdict']}"))
-        rows = study(methods, sizes, repeats, quick, store, hooks, target, wall_limit)
+        rows = study(methods, sizes, repeats, quick, store, hooks, target, limit)
     _publish(report(rows, store.root), store.root)
+    _end_with([line for row in rows for line in row.missing()])

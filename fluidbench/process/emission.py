@@ -104,6 +104,14 @@ class Emission:
         densities = [[s.material.density] for s in scene.scenarios]
         self.densities = wp.array(densities, dtype=float, ndim=2, device=scene.device)
 
+    def progress(self) -> list[int]:
+        """How many particles are in the nozzle or beyond, and how many discs have left it."""
+        return [self.inserted, self.released]
+
+    def go_on(self, progress: list[int]) -> None:
+        """From where another one came to."""
+        self.inserted, self.released = progress
+
     def advance(self, now: float, tick: float) -> None:
         """Bring the nozzle's content to time `now` [s] and set it moving towards its place one tick later."""
         pool, stream, track = self.pool, self.stream, self.scene.scenario.track

@@ -18,6 +18,15 @@ class Laying:
         self.advance(0.0)
         self.placed += Stream(scenario).particles if scenario.nozzle is not None else 0
 
+    def progress(self) -> list[int]:
+        """How many bodies wait, and how many particles were placed."""
+        return [len(self.waiting), self.placed]
+
+    def go_on(self, progress: list[int]) -> None:
+        """From where another one came to."""
+        self.waiting = self.waiting[len(self.waiting) - progress[0] :]
+        self.placed = progress[1]
+
     def advance(self, now: float) -> None:
         """Place the bodies that are due at `now` [s]."""
         while self.waiting and self.waiting[0].start <= now * (1.0 + 1e-9):

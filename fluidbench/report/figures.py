@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..scenario import Scenario
+from ..store import write_atomically
 from ..study.execute import Finished
 from .traces import Plot, load_frame
 
@@ -21,7 +23,7 @@ def _pyplot():
     return plt
 
 
-def draw(plot: Plot, folder: Path) -> Path:
+def draw(plot: Plot, folder: Path, prefix: str = "") -> Path:
     """One plot as a PNG."""
     plt = _pyplot()
     figure, axes = plt.subplots(figsize=(7.0, 4.0), layout="constrained")
@@ -44,13 +46,21 @@ def draw(plot: Plot, folder: Path) -> Path:
         axes.legend(frameon=False)
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
-    path = folder / f"{plot.name}.png"
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    return _save(figure, folder / f"{prefix}{plot.name}.png")
+
+
+def _save(figure: Any, path: Path) -> Path:
+    """A figure as a PNG, written atomically."""
+    import io
+
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=130)
+    _pyplot().close(figure)
+    write_atomically(path, buffer.getvalue())
     return path
 
 
-def draw_views(results: Sequence[Finished], folder: Path) -> Path | None:
+def draw_views(results: Sequence[Finished], folder: Path, prefix: str = "") -> Path | None:
     """Side and top view of every completed run, side by side, coloured by height or, from the side, by speed."""
     done = [r for r in results if r.ok and r.record["repeat"] == 0]
     if not done:
@@ -78,10 +88,7 @@ def draw_views(results: Sequence[Finished], folder: Path) -> Path | None:
             axes.set_ylabel("z [mm]" if axis == 2 else "y [mm]")
             axes.set_title(f"{result.label}, {name}", loc="left", fontsize=9)
     grid[-1, 0].set_xlabel("x [mm]")
-    path = folder / "views.png"
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
-    return path
+    return _save(figure, folder / f"{prefix}views.png")
 
 
 def _scatter(axes, frame, axis: int, scenario: Scenario, scale: float, fastest: float, box) -> None:

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ..offspring import command, environment
+
 ENDED = "ended"
 PATIENCE = 600.0  # longest wait for the last pictures after a run has ended [s]
 DRAWERS = max(1, min(4, (os.cpu_count() or 1) - 1))  # one core is the run's
@@ -29,8 +31,8 @@ class Film:
         (folder / "scenario.json").write_text(json.dumps(scenario))
         with (folder / "log.txt").open("w") as log:
             self.drawers = [
-                subprocess.Popen([sys.executable, "-m", __name__, str(folder), str(i), str(DRAWERS)], stdout=log,
-                                 stderr=log)
+                subprocess.Popen(command(__name__, str(folder), str(i), str(DRAWERS)), env=environment(),
+                                 stdin=subprocess.DEVNULL, stdout=log, stderr=log)
                 for i in range(DRAWERS)
             ]  # fmt: skip
 

@@ -103,9 +103,9 @@ def plotly_html(plot: Plot) -> str:
 
 
 def write_page(
-    results: Sequence[Finished], tables: Sequence[Table], drawn: Sequence[Plot], views: Path | None, root: Path
+    results: Sequence[Finished], tables: Sequence[Table], drawn: Sequence[Plot], views: Path | None, path: Path
 ) -> Path:
-    """Write report.html into the study's folder."""
+    """Write the page of a comparison, beside what it links to."""
     from markupsafe import Markup
 
     first: dict[str, Any] = next((r.record for r in results if "input" in r.record), results[0].record)
@@ -124,9 +124,8 @@ def write_page(
                for line in r.record.get("approximations", [])],
         views=base64.b64encode(views.read_bytes()).decode() if views is not None else "",
         plots=[Markup(plotly_html(plot)) for plot in drawn],
-        files=run_files(results, root),
+        files=run_files(results, path.parent),
         machine="; ".join(f"{key} {value}" for key, value in machine.items()),
     )  # fmt: skip
-    path = root / "report.html"
     write_atomically(path, page)
     return path

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..store import write_atomically
+from ..store import write_atomically, write_parquet
 from ..study.execute import Finished
 from .html import environment, plotly_html, script
 from .tables import Table, show
@@ -69,15 +69,11 @@ def record_link(run: Finished, root: Path, label: str = "") -> tuple[str, str]:
 
 def publish(report: Report, root: Path, console: Console) -> Path:
     """Print the tables and findings; write VERB.parquet, VERB.json, a PNG for each plot and report.html."""
-    import io
-
     from markupsafe import Markup
 
     from .figures import draw
 
-    buffer = io.BytesIO()
-    report.data.to_parquet(buffer)
-    write_atomically(root / f"{report.verb}.parquet", buffer.getvalue())
+    write_parquet(root / f"{report.verb}.parquet", report.data)
     rows = json.loads(str(report.data.to_json(orient="records")))
     write_atomically(root / f"{report.verb}.json", json.dumps({"findings": report.findings, "rows": rows}, indent=1))
     for plot in report.plots:

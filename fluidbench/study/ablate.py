@@ -12,6 +12,7 @@ from ..scenario import Friction, Scenario
 from ..solver import configure, get_solver
 from ..store import Store
 from ..target import Target
+from ..verdict import lacking
 from .compare import lengths_of
 from .execute import Finished, Hooks, execute
 from .stability import varied
@@ -53,6 +54,11 @@ class Ablation:
     effects: list[Effect] = field(default_factory=list)
     lean: dict[str, Effect] = field(default_factory=dict)
     impossible: list[str] = field(default_factory=list)
+
+    def missing(self) -> list[str]:
+        """Runs that it needed and has nothing of; that a method refuses a change is an answer."""
+        runs = [*(e.run for e in self.effects), *(e.run for e in self.lean.values())]
+        return lacking(self.base.values()) + lacking(runs, refusals=False)
 
 
 def changes(scenario: Scenario, methods: Sequence[str]) -> list[Change]:

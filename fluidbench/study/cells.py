@@ -30,9 +30,8 @@ def runs_of(trials: Sequence[Trial]) -> list[Finished]:
 
 
 def figures(repeats: dict[str, list[Finished]], key: str) -> dict[str, list[float]]:
-    """A cost figure of every completed repeat; methods that never completed are missing."""
-    found = {m: [r.record["cost"][key] for r in runs if r.ok] for m, runs in repeats.items()}
-    return {m: values for m, values in found.items() if values}
+    """A cost figure of every repeat; methods of which one is not a result are missing."""
+    return {m: [r.record["cost"][key] for r in runs] for m, runs in repeats.items() if runs and all(r.ok for r in runs)}
 
 
 def all_runs(e: Evidence) -> list[Finished]:

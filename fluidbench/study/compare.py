@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..run import Job
 from ..scenario import Scenario
 from ..solver import check_backend, configure, get_solver
-from ..store import write_atomically
 from ..target import Target
 from .execute import Finished
 
@@ -19,17 +17,17 @@ if TYPE_CHECKING:
 
 
 def jobs(
-    scenario: Scenario, methods: Sequence[str], repeats: int, targets: Sequence[Target], wall_limit: float | None,
-    keep_frames: bool, film_every: float | None = None,
-) -> list[Job]:  # fmt: skip
-    """All runs of a comparison; raises UserError for an unknown method or setting before anything has run."""
+    scenario: Scenario, methods: Sequence[str], repeats: int, targets: Sequence[Target], **watched: Any
+) -> list[Job]:
+    """All runs of a comparison, `watched` as a Job says; raises UserError for an unknown method or setting, and for a
+    scenario that this machine cannot hold, before anything has run."""
     for name in methods:
         configure(get_solver(name), scenario)
         for target in targets:
             check_backend(get_solver(name), target)
     table = scenario.model_dump(mode="json")
     return [
-        Job(table, name, target, repeat, wall_limit, keep_frames, film_every)
+        Job(table, name, target, repeat, **watched)
         for name in methods
         for target in targets
         for repeat in range(repeats)
@@ -47,7 +45,7 @@ def tidy(results: Sequence[Finished]) -> pd.DataFrame:
             k: record.get(k)
             for k in ("scenario", "method", "device", "backend", "threads", "repeat", "seed", "spacing_m")
         }
-        row |= {"verdict": record["verdict"], "reason": record.get("reason", "")}
+        row |= {"verdict": result.verdict, "reason": result.reason, "reused": result.reused}
         row |= record.get("measures", {})
         row |= {f"error: {a['quantity']}": a["error"] for a in record.get("answers", [])}
         row |= record.get("cost", {})
@@ -69,14 +67,3 @@ def binding(record: dict[str, Any]) -> str:
     """The bound that held the step back for most of the simulated time."""
     held = record.get("binding_s") or {}
     return max(held, key=held.__getitem__) if held else ""
-
-
-def write_tables(table: pd.DataFrame, root: Path) -> list[Path]:
-    """The table as parquet and CSV."""
-    import io
-
-    buffer = io.BytesIO()
-    table.to_parquet(buffer)
-    write_atomically(root / "compare.parquet", buffer.getvalue())
-    write_atomically(root / "compare.csv", table.to_csv(index=False))
-    return [root / "compare.parquet", root / "compare.csv"]

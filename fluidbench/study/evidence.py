@@ -12,10 +12,10 @@ from ..scenario import Scenario
 from ..solver import configure, get_solver
 from ..store import Store
 from ..target import Target
+from ..verdict import lacking
 from .case import Case, Finding, cases
 from .execute import Finished, Hooks, execute
-from .experiments import run_tasks
-from .stability import Spacing, measure_point, point_tasks, varied
+from .stability import ERROR, Spacing, measure_points, point_tasks, varied
 from .validate import Trial
 
 METHODS = ("mpm", "sph", "pbd")
@@ -47,6 +47,23 @@ class Evidence:
     limits: dict[str, list[dict[str, Any]]] = field(default_factory=dict)  # measured points of `stability`
     other: dict[str, list[Finished]] = field(default_factory=dict)  # `repeats` in the other backend
     other_trials: list[Trial] = field(default_factory=list)  # COST_CASES in the other backend
+
+    def runs(self) -> list[Finished]:
+        """Every run that was made for it."""
+        groups = [*self.repeats.values(), *self.grids.values(), *self.iterations.values(), *self.advances.values(),
+                  *self.other.values(), list(self.second.values())]  # fmt: skip
+        trials = [list(t.runs.values()) for t in [*self.trials, *self.other_trials]]
+        return [run for group in [*groups, *trials] for run in group]
+
+    def missing(self) -> list[str]:
+        """What it needed and has nothing of, one line each, with the reason."""
+        points = [p for rows in self.limits.values() for p in rows if p.get("verdict") == ERROR]
+        return lacking(
+            [
+                *self.runs(),
+                *(t for t in [*self.trials, *self.other_trials] if t.judged and not t.runs and t.finding is None),
+            ]
+        ) + [f"stability, {p['axis']} = {p['value']:g}, {p['method']}: {p['verdict']}: {p['reason']}" for p in points]
 
 
 def chosen_cases(quick: bool) -> list[Case]:
@@ -101,8 +118,8 @@ def gather(
     found.iterations = sweep("pbd", ITERATIONS, lambda n, f: _pbd("iterations", n, f * scenario.spacing))
     found.advances = sweep("pbd", ADVANCES, lambda a, f: _pbd("advance", a, f * scenario.spacing))
     tasks = point_tasks(scenario, {"spacing": LIMITS}, METHODS, quick, target)
-    rows = run_tasks(tasks, measure_point, store, workers, lambda *_: None)
-    found.limits = {m: [r for r in rows if r.get("method") == m] for m in METHODS}
+    rows = measure_points(tasks, store, workers, lambda *_: None)
+    found.limits = {m: [r for r in rows if r["method"] == m] for m in METHODS}
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -14,11 +14,12 @@ from ..library import validate
 from ..measure.reference import table as reference
 from ..scenario import Scenario
 from ..solver import configure, get_solver, refusal
+from ..store import Store
 from ..target import Target
 from ..timestep import damped_limit
-from .experiments import Task
+from .experiments import CRASH, Task, run_tasks
 
-HELD, FAILED, REFUSED = "held", "failed", "refused"
+HELD, FAILED, REFUSED, ERROR = "held", "failed", "refused", "error"
 OPENING_STEPS = 2000  # substeps of the scenario itself, from its start, in a full study
 SPACINGS = (1 / 3, 0.5, 1.0, 2.0, 8 / 3)
 BARE = {
@@ -86,6 +87,32 @@ def point_tasks(
                 }  # fmt: skip
                 tasks.append((f"{name}-{method}", task))
     return tasks
+
+
+def measure_points(
+    tasks: Sequence[tuple[str, Task]], store: Store, workers: int, done: Callable[[int, dict[str, Any]], None]
+) -> list[dict[str, Any]]:
+    """A row a point, in order; one that could not be measured has the verdict `error` and says why."""
+
+    def row(i: int, result: dict[str, Any]) -> dict[str, Any]:
+        task = tasks[i][1]
+        if CRASH not in result:
+            return result
+        return {key: task[key] for key in ("axis", "value", "method")} | {"verdict": ERROR, "reason": result[CRASH]}
+
+    results = run_tasks(tasks, measure_point, store, workers, lambda i, r: done(i, row(i, r)))
+    return [row(i, result) for i, result in enumerate(results)]
+
+
+def measure_blocks(
+    tasks: Sequence[tuple[str, Task]], store: Store, workers: int, done: Callable[[int, dict[str, Any]], None]
+) -> list[dict[str, Any]]:
+    """A row a block, in order; one that could not be measured has a `reason` instead of limits."""
+    results = run_tasks(tasks, measure_block, store, workers, done)
+    return [
+        r if CRASH not in r else {"kind": t["kind"], "method": t["method"], "reason": r[CRASH]}
+        for (_, t), r in zip(tasks, results, strict=True)
+    ]
 
 
 def measure_point(task: Task) -> dict[str, Any]:
@@ -230,16 +257,19 @@ def findings(points: Sequence[dict[str, Any]], blocks: Sequence[dict[str, Any]])
     """One sentence each: agreement with theory, whether defaults held, what narrows each method's step most."""
     lines = []
     for b in blocks:
+        if "dt_limit_s" not in b:
+            lines.append(f"{b['method']}, {b['kind']} block: {ERROR}: {b['reason']}.")
+            continue
         ratio = b["dt_limit_s"] / b["dt_theory_s"]
         lines.append(
             f"{b['method']}, {b['kind']} block: stable up to dt = {b['dt_limit_s']:.3g} s, {ratio:.2f} of theory; the "
             f"method's own bound is {b['dt_own_s'] / b['dt_limit_s']:.2f} of what was measured."
         )
-    verdicts = [p.get("verdict", FAILED) for p in points]
-    counts = {v: verdicts.count(v) for v in (HELD, REFUSED, FAILED)}
+    verdicts = [p["verdict"] for p in points]
+    counts = {v: verdicts.count(v) for v in (HELD, REFUSED, FAILED, ERROR)}
     lines.append(
         f"Default steps: {len(points)} points tried, {counts[HELD]} held, {counts[REFUSED]} refused, "
-        f"{counts[FAILED]} failed."
+        f"{counts[FAILED]} failed" + f", {counts[ERROR]} could not be measured" * (counts[ERROR] > 0) + "."
     )
     pairs = dict.fromkeys((p["axis"], p["method"]) for p in points)
     lines += [_narrowing(points, axis, method) for axis, method in pairs]

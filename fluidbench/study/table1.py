@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from statistics import mean, stdev
 from typing import Any
 
 from ..scenario import Scenario
 from ..solver import configure, get_solver
+from ..verdict import Evidence as Weight
+from ..verdict import evidence_of
 from .cells import Cell, all_runs, figures, runs_of
 from .compare import lengths_of
 from .evidence import COST_CASES, METHODS, SHIPPED, Evidence
 from .execute import Finished
 from .frameworks import frameworks
-from .stability import varied
+from .stability import HELD, varied
 from .validate import Trial
 from .verdicts import (
     APART,
@@ -28,10 +31,12 @@ from .verdicts import (
     POOR,
     REFUTED,
     agreed,
+    answers_of,
     equal_error,
     placed,
     ranked,
     share_within,
+    told,
     winners,
 )
 
@@ -45,10 +50,14 @@ COLLAPSING = ("collapse_threshold", "slump_slip")
 
 
 def table1(e: Evidence) -> list[Cell]:
-    """Every cell of the paper's table, then its claims in words."""
-    return [
+    """Every cell of the paper's table, then its claims in words. Where nothing ran there is no verdict at all: what is
+    shipped, and bounds, say nothing of code that does not run."""
+    cells = [
         *paradigm(), *fidelity(e), *stability(e), *cost(e), *best_for(e), *limits(e), *claims(e), *frameworks(e)
     ]  # fmt: skip
+    if not any(evidence_of(run.verdict) is not Weight.NOTHING for run in e.runs()):
+        cells = [replace(cell, verdict=OPEN) for cell in cells]
+    return cells
 
 
 def paradigm() -> list[Cell]:
@@ -56,15 +65,13 @@ def paradigm() -> list[Cell]:
     return [Cell("paradigm", m, words[m], get_solver(m).paradigm, "none", "definition", OPEN) for m in words]
 
 
-def _answers(trials: Sequence[Trial], methods: Sequence[str], physics: Sequence[str]) -> list[Trial]:
-    return [t for t in trials if t.method in methods and t.case.physics in physics and t.level in JUDGED]
-
-
 def _tally(trials: Sequence[Trial], method: str, physics: Sequence[str]) -> tuple[int, int, str]:
     """(passed, judged, the same in words)."""
     passed, judged = share_within(trials, method, physics)
-    old = sum(t.note == SHIPPED for t in _answers(trials, [method], physics))
-    return passed, judged, f"{passed} of {judged} known answers within tolerance" + (f" ({old} {SHIPPED})" * (old > 0))
+    own = answers_of(trials, [method], physics)
+    old, lost = sum(t.note == SHIPPED for t in own), len(own) - judged
+    words = f"{passed} of {judged} known answers within tolerance" + f" ({old} {SHIPPED})" * (old > 0)
+    return passed, judged, words + f"; {lost} could not be run" * (lost > 0)
 
 
 def fidelity(e: Evidence) -> list[Cell]:
@@ -78,11 +85,12 @@ def fidelity(e: Evidence) -> list[Cell]:
             passed, judged, measured = _tally(e.trials, method, physics)
             word = paper.get((method, kind), "-")
             verdict = OPEN
-            if judged >= FEWEST and word != "-":
+            own = answers_of(e.trials, [method], physics)
+            if judged >= FEWEST and word != "-" and told(own):
                 share = passed / judged
                 low = word.startswith("plausible")
                 verdict = CONFIRMED if (share <= POOR if low else share >= GOOD) else REFUTED
-            runs = runs_of(_answers(e.trials, [method], physics))
+            runs = runs_of(own)
             cells.append(Cell(f"fidelity, {kind}", method, word, measured, "validate", "fidelity", verdict, runs))
     return cells
 
@@ -96,14 +104,14 @@ def stability(e: Evidence) -> list[Cell]:
     }
     speed, dts = e.scenario.wave_speed, figures(e.repeats, "mean_dt_s")
     measured = {
-        m: [r["dt_lump_s"] * speed / (r["value"] * e.scenario.spacing) for r in rows if r["verdict"] == "held"]
+        m: [r["dt_lump_s"] * speed / (r["value"] * e.scenario.spacing) for r in rows if r["verdict"] == HELD]
         for m, rows in e.limits.items()
     }
-    places = ranked({m: v for m, v in measured.items() if len(v) >= FEWEST})
+    places = ranked({m: v for m, v in measured.items() if len(v) >= FEWEST and len(v) == len(e.limits[m])})
     cells = []
     for m, (word, place) in words.items():
-        beyond = ">= " if any(not r.get("lump_limit_found", True) for r in e.limits[m]) else ""
-        steps = " and ".join(f"{v:.2f}" for v in measured[m]) or "not found"
+        beyond = ">= " if any(not r.get("lump_limit_found", True) for r in e.limits.get(m, [])) else ""
+        steps = " and ".join(f"{v:.2f}" for v in measured.get(m, [])) or "not found"
         text = f"largest stable dt {beyond}{steps} d/c"
         text += f"; mean default dt {mean(dts[m]):.3g} s" if m in dts else ""
         verdict = placed(places[m], place) if len(places) == 3 else OPEN
@@ -140,7 +148,7 @@ def best_for(e: Evidence) -> list[Cell]:
         judged = sum(wins.values())
         verdict = OPEN if judged < FEWEST else CONFIRMED if wins.get(m, 0) > judged / 2 else REFUTED
         tally = ", ".join(f"{k} {n}" for k, n in sorted(wins.items(), key=lambda item: -item[1])) or "none"
-        runs = runs_of(_answers(e.trials, METHODS, physics))
+        runs = runs_of(answers_of(e.trials, METHODS, physics))
         cells.append(
             Cell("best for", m, word, f"cheapest within tolerance on: {tally}", "validate", "best", verdict, runs)
         )
@@ -207,9 +215,10 @@ def physical_accuracy(e: Evidence) -> Cell:
         widths = [(v, _widths(runs)) for v, runs in sweep.items()]
         shown = "; ".join(f"{v:g}: {' and '.join(f'{1e3 * w:.1f}' for w in seen)}" for v, seen in widths if seen)
         measured += f"; bead width [mm] over {name}: {shown}"
-    verdict = OPEN if judged < FEWEST else CONFIRMED if passed <= POOR * judged else REFUTED
+    own = answers_of(e.trials, ["pbd"], every)
+    verdict = OPEN if judged < FEWEST or not told(own) else CONFIRMED if passed <= POOR * judged else REFUTED
     runs = [r for sweep in (e.iterations, e.advances) for group in sweep.values() for r in group]
-    runs += runs_of(_answers(e.trials, ["pbd"], every))
+    runs += runs_of(own)
     word = "low physical accuracy"
     return Cell("limits: accuracy", "pbd", word, measured, "validate, iterations, steps", "fidelity", verdict, runs)
 
@@ -241,12 +250,14 @@ def claims(e: Evidence) -> list[Cell]:
 
 def prediction(e: Evidence, word: str, names: Sequence[str]) -> Cell:
     """PBD's known answers on a set of cases."""
-    own = [t for t in e.trials if t.case.name in names and t.method == "pbd" and t.level in JUDGED]
-    own = [t for t in own if t.verdict != "skipped"]
+    own = [t for t in e.trials if t.case.name in names and t.method == "pbd" and t.level in JUDGED and t.judged]
     missed = [t for t in own if not t.error <= t.tolerance]
-    measured = ", ".join(f"{t.case.name}: error {t.error:.2g} of {t.tolerance:g}" for t in own)
+    measured = ", ".join(
+        f"{t.case.name}: " + (f"error {t.error:.2g} of {t.tolerance:g}" if t.finding is not None else str(t.verdict))
+        for t in own
+    )
     measured += f" ({SHIPPED})" if any(t.note == SHIPPED for t in own) else ""
-    verdict = OPEN if len(own) < FEWEST else CONFIRMED if len(missed) > len(own) / 2 else REFUTED
+    verdict = OPEN if len(own) < FEWEST or not told(own) else CONFIRMED if len(missed) > len(own) / 2 else REFUTED
     return Cell("claim", "pbd", word, measured or "not run", "validate", "prediction", verdict, runs_of(own))
 
 

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import mean, stdev
 
+from ..layout import capacity_of
 from ..library import load
 from ..run import Job
 from ..store import Store
 from ..target import Target
+from ..verdict import lacking
+from .cells import figures
 from .execute import Finished, Hooks, execute
 from .verdicts import CONFIRMED, EFFECT, OPEN, REFUTED
 
@@ -33,14 +36,19 @@ class Row:
     filmed: list[Finished]
 
     def speed(self, filmed: bool = False) -> list[float]:
-        """Steps a second of every completed repeat."""
-        runs = self.filmed if filmed else self.bare
-        return [r.record["cost"]["steps_per_s"] for r in runs if r.ok]
+        """Steps a second of every repeat; none where one is not a result."""
+        return self._costs("steps_per_s", filmed)
 
     def pace(self, filmed: bool = False) -> list[float]:
-        """Simulated over real time of every completed repeat."""
-        runs = self.filmed if filmed else self.bare
-        return [r.record["cost"]["simulated_to_real"] for r in runs if r.ok]
+        """Simulated over real time of every repeat; none where one is not a result."""
+        return self._costs("simulated_to_real", filmed)
+
+    def _costs(self, key: str, filmed: bool) -> list[float]:
+        return figures({"": self.filmed if filmed else self.bare}, key).get("", [])
+
+    def missing(self) -> list[str]:
+        """Runs that the row needs and has nothing of."""
+        return lacking([*self.bare, *self.filmed])
 
 
 def table2(
@@ -56,11 +64,19 @@ def table2(
                 table = scenario.model_dump(mode="json")
                 groups = []
                 for every in (None, PICTURE):
-                    jobs = [Job(table, method, target, repeat=r, wall_limit=wall_limit, film_every=every)
+                    variant = "" if every is None else "pictures"
+                    jobs = [Job(table, method, target, r, variant, wall_limit, film_every=every)
                             for r in range(repeats)]  # fmt: skip
                     groups.append(execute(jobs, store, hooks))
                 rows.append(Row(variant, pool, method, *groups))
     return rows
+
+
+def check_pools(pools: Sequence[int | None], quick: bool) -> None:
+    """Raise UserError for a pool that a variant cannot be run in."""
+    for name in VARIANTS.values():
+        for pool in pools:
+            capacity_of(load(name, {} if pool is None else {"pool": pool}, quick))
 
 
 def claims(rows: Sequence[Row]) -> list[tuple[str, str, str, str]]:

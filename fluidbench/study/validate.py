@@ -17,8 +17,9 @@ from ..errors import UserError, suggestion
 from ..run import Job
 from ..scenario import Scenario
 from ..solver import configure, get_solver
-from ..store import Store, write_atomically
+from ..store import Store, write_atomically, write_parquet
 from ..target import Target
+from ..verdict import Evidence, Verdict, evidence_of
 from .case import METHOD_OF_LAW, Case, Finding, Run
 from .execute import Finished, Hooks, execute
 
@@ -43,6 +44,27 @@ class Trial:
     finding: Finding | None = None
     cost: dict[str, float] = field(default_factory=dict)
     runs: dict[str, Finished] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The trial in words."""
+        return f"{self.case.name}, {self.method}, d = {1e3 * self.spacing:.3g} mm"
+
+    @property
+    def reason(self) -> str:
+        return self.note
+
+    @property
+    def judged(self) -> bool:
+        """Whether it was to be run at all."""
+        return self.verdict != SKIPPED
+
+    @property
+    def evidence(self) -> Evidence:
+        """What it says of its method: a finding is a result, whatever became of the tolerance."""
+        if self.finding is not None:
+            return Evidence.RESULT
+        return evidence_of(self.verdict) if self.judged else Evidence.NOTHING
 
     @property
     def error(self) -> float:
@@ -125,7 +147,7 @@ def run(
 def evaluate(trial: Trial) -> None:
     """Judge a trial whose runs have all ended."""
     records = [finished.record for finished in trial.runs.values()]
-    failed = [record for record in records if record["verdict"] != "completed"]
+    failed = [record for record in records if evidence_of(record["verdict"]) is not Evidence.RESULT]
     costs = [record["cost"] for record in records if "cost" in record]
     simulated = sum(cost["simulated_s"] for cost in costs)
     trial.cost = {
@@ -136,10 +158,15 @@ def evaluate(trial: Trial) -> None:
         "wall_per_simulated_s": sum(cost["wall_s"] for cost in costs) / simulated if simulated else math.nan,
     }
     if failed:
-        trial.verdict, trial.note = failed[0]["verdict"], failed[0]["reason"]
+        first = min(failed, key=lambda record: evidence_of(record["verdict"]) is Evidence.INSTABILITY)
+        trial.verdict, trial.note = first["verdict"], first["reason"]
         return
     assert trial.case.evaluate is not None
-    trial.finding = trial.case.evaluate({label: Run(trial.runs[label]) for label in trial.jobs})
+    try:
+        trial.finding = trial.case.evaluate({label: Run(trial.runs[label]) for label in trial.jobs})
+    except Exception as error:  # one case's mistake must not end the others; it is shown as what it is
+        trial.verdict, trial.note = Verdict.ERROR, f"its evaluation failed: {type(error).__name__}: {error}"
+        return
     _judge(trial)
 
 
@@ -193,12 +220,8 @@ def tidy(trials: Sequence[Trial]) -> pd.DataFrame:
 
 def write_results(trials: Sequence[Trial], root: Path) -> None:
     """The table as parquet, and everything measured as JSON."""
-    import io
-
-    buffer = io.BytesIO()
     table = tidy(trials)
-    table.to_parquet(buffer)
-    write_atomically(root / "validate.parquet", buffer.getvalue())
+    write_parquet(root / "validate.parquet", table)
     rows = json.loads(str(table.to_json(orient="records")))
     for row, trial in zip(rows, trials, strict=True):
         row["numbers"] = [asdict(n) for n in trial.finding.numbers] if trial.finding else []

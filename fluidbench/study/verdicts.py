@@ -11,7 +11,8 @@ from statistics import mean, stdev
 
 import numpy as np
 
-from .evidence import COST_CASES
+from ..verdict import Evidence
+from .evidence import COST_CASES, METHODS
 from .validate import Trial
 
 CONFIRMED, REFUTED, OPEN = "confirmed", "refuted", "not decidable"
@@ -43,10 +44,21 @@ RULES = {
 }
 
 
+def answers_of(trials: Sequence[Trial], methods: Sequence[str], physics: Sequence[str]) -> list[Trial]:
+    """The known answers of these methods and classes that count."""
+    own = [t for t in trials if t.method in methods and t.case.physics in physics and t.level in JUDGED]
+    return [t for t in own if t.judged]
+
+
+def told(trials: Sequence[Trial]) -> bool:
+    """Whether all of these say something of their method: nothing rests on what a crash or a limit of time cut off."""
+    return all(t.evidence is not Evidence.NOTHING for t in trials)
+
+
 def share_within(trials: Sequence[Trial], method: str, physics: Sequence[str]) -> tuple[int, int]:
-    """(within tolerance, judged) of a method's known answers of these classes; a run that blew up is not within."""
-    own = [t for t in trials if t.method == method and t.case.physics in physics and t.level in JUDGED]
-    own = [t for t in own if t.verdict != "skipped"]
+    """(within tolerance, judged) of a method's known answers of these classes; a run that blew up is not within, one
+    that says nothing of the method is not judged."""
+    own = [t for t in answers_of(trials, [method], physics) if t.evidence is not Evidence.NOTHING]
     return sum(t.error <= t.tolerance for t in own), len(own)
 
 
@@ -81,8 +93,11 @@ def placed(place: tuple[int, int], word: str) -> str:
 
 def at_equal_error(trials: Sequence[Trial]) -> dict[str, float]:
     """Wall time [s] of each method at the error that the worst of them reaches at its best: by a power law through its
-    spacings, or, where its error does not fall with cost, its cheapest run within that error."""
+    spacings, or, where its error does not fall with cost, its cheapest run within that error. Nothing where a run says
+    nothing of its method."""
     points = {}
+    if not told([t for t in trials if t.judged]):
+        return {}
     for m in dict.fromkeys(t.method for t in trials):
         own = [(t.error, t.cost["wall_s"]) for t in trials if t.method == m and t.finding is not None and t.error > 0]
         if len(own) >= 2:
@@ -115,10 +130,11 @@ def _cost_at(target: float, points: np.ndarray) -> float:
 def winners(trials: Sequence[Trial], physics: Sequence[str]) -> dict[str, int]:
     """On how many cases each method is the cheapest of those within tolerance."""
     wins: dict[str, int] = {}
-    rows = [t for t in trials if t.case.physics in physics and t.level in JUDGED and t.case.drive is None]
+    rows = [t for t in answers_of(trials, METHODS, physics) if t.case.drive is None]
     for name in dict.fromkeys(t.case.name for t in rows):
-        good = [t for t in rows if t.case.name == name and t.error <= t.tolerance]
-        if good:
+        own = [t for t in rows if t.case.name == name]
+        good = [t for t in own if t.error <= t.tolerance]
+        if good and told(own):
             first = min(good, key=lambda t: t.cost["wall_s"]).method
             wins[first] = wins.get(first, 0) + 1
     return wins

@@ -164,7 +164,8 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
                 if held[p] != CARRIED:
                     growth = 1.0 + h * c.trace()
                     j = volume_ratio[p] * ti.max(growth, CRUSHED)
-                    broken = growth < CRUSHED or beyond(growth, STRETCHED) or beyond(j, STRETCHED) or j < 1.0 / STRETCHED
+                    broken = growth < CRUSHED or beyond(growth, STRETCHED)
+                    broken = broken or j < 1.0 / STRETCHED or beyond(j, STRETCHED)
                     b, s = elastic_normal[p], elastic_shear[p]
                     if phase.shear_modulus > 0.0:
                         b, s = strained(phase, phase.shear_modulus, c, b, s, h)

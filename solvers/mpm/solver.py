@@ -206,6 +206,10 @@ class SolverMPM(Solver):
         self.backend.prepare(self)
         self.started = False
 
+    def resume(self) -> None:
+        """The blocks of the grid are found anew; the affine field is that of the checkpoint."""
+        self.started, self.pool.stale = True, True
+
     def sort_keys(self) -> Any:
         return self.order.keys()
 

@@ -281,5 +281,8 @@ class Network:
             [pool.capacity, pool.count, scene.box, scene.phases, pool.phase, pool.position, self.bonds],
         )  # fmt: skip
 
+    def carried(self) -> dict[str, Any]:
+        return {f"bonds.{name}": getattr(self.bonds, name) for name in Bonds.vars}
+
     def footprint(self) -> dict[str, int]:
         return {f"bonds.{name}": getattr(self.bonds, name).capacity for name in Bonds.vars}

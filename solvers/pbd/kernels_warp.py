@@ -35,7 +35,7 @@ conveyed_modulus = warp_func(laws.conveyed_modulus, laws.largest_modulus)
 SLACK = wp.constant(
     2.0e-3
 )  # density that is left alone, over that at rest: what the lattices of round bodies are off by
-HURRIED = wp.constant(10.0)  # corrections of a crowded start are fast for a substep: this much beyond any matter's speed
+HURRIED = wp.constant(10.0)  # corrections of a crowded start are this much faster, for a substep, than any matter
 FARTHEST = wp.constant(1.0e3)  # spacings beyond which no constraint wants a particle to move
 STRETCHED = wp.constant(1.0e6)  # trace of the elastic tensor that no matter reaches [-]
 SLACK_SOLID = wp.constant(0.1)  # a solid's bonds keep its density; the constraint only keeps its parts apart

@@ -304,6 +304,10 @@ class SolverPBD(Solver):
         self.neighbours.prepare()
         self.backend.prepare(self)
 
+    def carried(self) -> dict[str, Any]:
+        network = {} if self.network is None else self.network.carried()
+        return {"fill": self.fill, **self.neighbours.carried(), **network}
+
     def sort_keys(self) -> Any:
         return self.order.keys() if self.network is None else None  # bonds name their partners by slot
 

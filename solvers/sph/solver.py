@@ -226,6 +226,9 @@ class SolverSPH(Solver):
         self.neighbours.prepare()
         self.backend.prepare(self)
 
+    def carried(self) -> dict[str, Any]:
+        return self.neighbours.carried()
+
     def sort_keys(self) -> Any:
         return self.order.keys()
 

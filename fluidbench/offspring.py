@@ -1,0 +1,40 @@
+"""Python processes of ours: the same code as here, whatever lies in the user's folder and environment."""
+
+import os
+import sys
+import sysconfig
+from pathlib import Path
+
+NOISE = (
+    "PYTHONPATH", "PYTHONSTARTUP", "PYTHONINSPECT", "PYTHONWARNINGS", "PYTHONDEBUG", "PYTHONVERBOSE",
+    "PYTHONPROFILEIMPORTTIME", "PYTHONOPTIMIZE", "PYTHONBREAKPOINT",
+)  # fmt: skip
+"""Variables that change what a Python process imports or prints."""
+START = (
+    "import sys; sys.path[:] = sys.argv[2].split(sys.argv[1]); module = sys.argv[3]; del sys.argv[1:4]; "
+    "import runpy; runpy.run_module(module, run_name='__main__', alter_sys=True)"
+)
+
+
+def environment() -> dict[str, str]:
+    """The environment of a child: never the current folder on its path (PYTHONSAFEPATH), nothing of NOISE."""
+    return {k: v for k, v in os.environ.items() if k not in NOISE} | {"PYTHONSAFEPATH": "1"}
+
+
+def search_path() -> list[str]:
+    """Where a child looks for modules: first the standard library, then the package that runs here, then what the
+    parent has, so that no file of the user's can take the place of one of ours or of Python's."""
+    own = str(Path(__file__).resolve().parents[1])
+    given = [os.path.realpath(entry) for entry in sys.path if entry]
+    libraries = {os.path.realpath(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")}
+    standard = [e for e in given if e in libraries or Path(e).parent.as_posix() in libraries or e.endswith(".zip")]
+    standard = [e for e in standard if Path(e).name not in ("site-packages", "dist-packages")]
+    installed = [e for e in given if Path(e).name in ("site-packages", "dist-packages")]
+    user = [e for e in given if e not in (*standard, *installed, own)]
+    return list(dict.fromkeys([*standard, own, *installed, *user]))
+
+
+def command(module: str, *arguments: str) -> list[str]:
+    """The command line that runs a module of ours in a process of its own."""
+    path = search_path()
+    return [sys.executable, "-P", "-c", START, os.pathsep, os.pathsep.join(path), module, *arguments]
