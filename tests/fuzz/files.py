@@ -69,7 +69,8 @@ def scenario_files(rng: random.Random) -> Iterator[Case]:
 def references(rng: random.Random) -> Iterator[Case]:
     """What is given for a scenario: neither a shipped name nor a file."""
     given = (
-        "", ".", "..", "/", "/dev/null", "/dev/zero", "x" * 255, "x" * 5000, "x" * 5000 + ".toml", "a/" * 2000 + "b.toml",
+        "", ".", "..", "/", "/dev/null", "/dev/zero", "x" * 255, "x" * 5000, "x" * 5000 + ".toml",
+        "a/" * 2000 + "b.toml",
         "../../../../../../etc/passwd", "\x1b[31mred", "a\x00b", "a\x00b.toml", "line_bead\n", "*.toml", "LINE_BEAD",
         "line-bead", "folder", "folder.toml", "nothing.toml", "\udcff", "\udcff.toml", "名前", "~", "$HOME", "file:///x.toml",
         "https://example.org/x.toml", "con", "line_bead.toml", "line_bead/", "./line_bead", " ", "0", "nan", "None",
@@ -85,7 +86,8 @@ def extends(rng: random.Random) -> Iterator[Case]:
     """What a file extends."""
     sort, verbs = "extends", ("compare", "run", "show", "select")
     wrong = (
-        "5", "5.0", "true", "false", "[]", '["line_bead"]', "{}", '{file = "line_bead"}', "nan", "1979-05-27", '[["x"]]',
+        "5", "5.0", "true", "false", "[]", '["line_bead"]', "{}", '{file = "line_bead"}', "nan", "1979-05-27",
+        '[["x"]]',
         "inf", "[1, 2]", "-1", "{a = {b = 1}}",
     )  # fmt: skip
     for text in wrong:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+SEED = int(os.environ.get("FUZZ_SEED", "20250611"))
 REFUSED, EITHER, ACCEPTED = "refused", "either", "accepted"
 LINES, CHARACTERS = 6, 2000  # a handful of lines, and what fits on a screen
 MEMORY = 6 * 2**30  # bytes that a case may ask for: on a bigger wish Python says MemoryError and the machine lives
@@ -44,7 +45,7 @@ class Case:
     """A command line with the files that it needs and what must come of it.
 
     `names`: a refusal holds one of these words (none given: any text does); `says`: and matches this expression.
-    `{base}` in an argument stands for the folder two above the one where the command runs.
+    `{base}` in an argument or a file stands for the folder two above the one where the command runs.
     """
 
     sort: str
@@ -180,7 +181,7 @@ def attempt(case: Case, base: Path) -> tuple[Outcome, list[str]]:
         (work / folder).mkdir(parents=True)
     for name, data in case.files.items():
         (work / name).parent.mkdir(parents=True, exist_ok=True)
-        (work / name).write_bytes(data if isinstance(data, bytes) else data())
+        (work / name).write_bytes(data.replace(b"{base}", str(base).encode()) if isinstance(data, bytes) else data())
     before, home = listing(base), Path.cwd()
     os.chdir(work)
     try:
@@ -224,3 +225,8 @@ def _violations(case: Case, done: Outcome, touched: list[tuple[str, int]]) -> It
         yield f"does not name {' or '.join(case.names)}: {text[:300]}"
     elif case.says and not re.search(case.says, text):
         yield f"does not say /{case.says}/: {text[:300]}"
+
+
+def told(found: list[str], most: int = 25) -> str:
+    """Violations as an assertion shows them."""
+    return f"{len(found)} violations:\n  " + "\n  ".join(found[:most])

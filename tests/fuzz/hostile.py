@@ -31,12 +31,14 @@ TITLES = (
 )
 VERBS = ("compare", "compare", "compare", "run", "show", "stability", "ablate", "select", "table1")
 NO_EFFECT = (
-    ("line_bead", "numerics.MPM", "{grid_ratio = 2.0}", "mpm"), ("line_bead", "numerics.mmp", "{grid_ratio = 2.0}", "mpm"),
+    ("line_bead", "numerics.MPM", "{grid_ratio = 2.0}", "mpm"), ("line_bead", "numerics.mmp", "{grid_ratio = 2.0}",
+    "mpm"),
     ("line_bead", "numerics.SPH.cfl", "0.3", "sph"), ("line_bead", "numerics.pbdd.iterations", "4", "pbd"),
     ("line_bead", "numerics.mpm.Grid_ratio", "2.0", "grid_ratio"), ("line_bead", "toolpath.center", "[0.0, 0.0]", ""),
     ("line_bead", "toolpath.radius", "0.1", ""), ("line_bead", "toolpath.points", "[[0.0, 0.0], [0.01, 0.0]]", ""),
     ("line_bead", "toolpath.dwell", "1.0", ""), ("ring_tower", "toolpath.start", "[0.0, 0.0]", ""),
-    ("ring_tower", "toolpath.end", "[0.1, 0.0]", ""), ("ring_tower", "toolpath.points", "[[0.0, 0.0], [0.01, 0.0]]", ""),
+    ("ring_tower", "toolpath.end", "[0.1, 0.0]", ""), ("ring_tower", "toolpath.points", "[[0.0, 0.0], [0.01, 0.0]]",
+    ""),
     ("ring_tower", "toolpath.dwell", "1.0", ""), ("wall", "toolpath.radius", "0.1", ""),
     ("wall", "toolpath.center", "[0.0, 0.0]", ""), ("polyline", "toolpath.start", "[0.0, 0.0]", ""),
     ("polyline", "toolpath.radius", "0.1", ""), ("dam_break", "bodies.0.radius", "0.01", ""),
@@ -55,14 +57,16 @@ NO_EFFECT = (
 """(base, key, value, word of the nearest key that has an effect)."""
 CURES = {
     "jump": ("time", "rate", "stages", "rate_autocatalytic", "exponent"),
-    "stages": ("rate", "rate_autocatalytic", "exponent"), "linear": ("rate", "stages", "rate_autocatalytic", "exponent"),
+    "stages": ("rate", "rate_autocatalytic", "exponent"), "linear": ("rate", "stages", "rate_autocatalytic",
+               "exponent"),
     "first_order": ("time", "stages", "rate_autocatalytic", "exponent"),
     "kamal_sourour": ("time", "stages", "exponent"), "avrami": ("time", "stages", "rate_autocatalytic"),
 }  # fmt: skip
 """Of each law of curing the keys that only others use."""
 NAMES = (
-    "../../climbed", "..", ".", "", "/tmp/absolute", "{base}/absolute", "a/b", "a/../b", "/", "./here", "a\nb", "a\tb",
-    "\x00", "a\x1b[31mb", "\x7f", "x" * 300, "x" * 5000, "é" * 200, "../" * 50 + "up", "runs/../../up",
+    "../../climbed", "..", ".", "", "{base}/absolute", "../../../climbed", "a/b", "a/../b", "/", "./here", "a\nb",
+    "a\tb",
+    "\x00", "a\x1b[31mb", "\x7f", "x" * 300, "x" * 5000, "é" * 200, "runs/../../up",
 )  # fmt: skip
 ODD_NAMES = ("-x", " ", "a b", "名前", "CON", "a\\b", "~", "a.b", "$HOME", "a;b", "x" * 60, "{{name}}", "%s", "x" * 250)
 
@@ -137,7 +141,8 @@ def vectors(rng: random.Random) -> Iterator[Case]:
             i = rng.randrange(leaf.size)
             row = f"[{bad}, 0.0, 0.0]" if matrix else bad
             text = f"[{', '.join([*good[:i], row, *good[i + 1 :]])}]"
-            yield ways("vectors", leaf, text, REFUSED, (leaf.key,), rng)
+            told = (leaf.key, leaf.path.split(".")[0]) if bad.startswith("1e") else (leaf.key,)  # see `magnitudes`
+            yield ways("vectors", leaf, text, REFUSED, told, rng)
         for text in ("[]", f"[{', '.join([*good, good[0]])}]", good[0] if not matrix else "1.0", '"text"', "{}", "nan",
                      f"[[{', '.join(good)}]]", f"[{', '.join(['0.0'] * 100_000)}]", "true"):  # fmt: skip
             yield ways("vectors", leaf, text, REFUSED, (leaf.key,), rng)

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 
 from . import hostile, options
-from .harness import REFUSED, Case, attempt, nothing_runs
+from .harness import REFUSED, SEED, Case, attempt, nothing_runs, told
 
-SEED = int(os.environ.get("FUZZ_SEED", "20250611"))
 ROOT = Path(__file__).parents[2]
 SHORT = hostile.cases(SEED, short=True)
 
@@ -31,10 +30,6 @@ def tried(cases: list[Case], base: Path) -> tuple[Counter, list[str]]:
         counts["violations"] += bool(wrong)
         found += [f"{case}\n      {'; '.join(wrong)}"] if wrong else []
     return counts, found
-
-
-def told(found: list[str], most: int = 25) -> str:
-    return f"{len(found)} violations:\n  " + "\n  ".join(found[:most])
 
 
 @pytest.mark.parametrize("sort", SHORT)
@@ -85,7 +80,8 @@ def test_every_option_of_every_verb_is_under_fuzz():
 
 
 TRUTH = [Case("truth", words) for words in (
-    ("show", "line_bead", "--set", "material.density=-3"), ("compare", "no_such_scenario"), ("table2", "--pools", "298k"),
+    ("show", "line_bead", "--set", "material.density=-3"), ("compare", "no_such_scenario"), ("table2", "--pools",
+    "298k"),
 )] + [Case("truth", ("show", "line_bead"), "accepted")]  # fmt: skip
 
 
