@@ -22,7 +22,7 @@ from unittest.mock import patch
 SEED = int(os.environ.get("FUZZ_SEED", "20250611"))
 REFUSED, EITHER, ACCEPTED = "refused", "either", "accepted"
 LINES, CHARACTERS = 6, 2000  # a handful of lines, and what fits on a screen
-MEMORY = 6 * 2**30  # bytes that a case may ask for: on a bigger wish Python says MemoryError and the machine lives
+MEMORY = 3 * 2**30  # bytes that a case may ask for: on a bigger wish Python says MemoryError and the machine lives
 STUBS = {
     "fluidbench.study.execute": ("execute",),
     "fluidbench.study.experiments": ("run_tasks",),

@@ -199,9 +199,9 @@ def _of(kind: str) -> list[Leaf]:
 
 GENERATORS: tuple[tuple[Callable[[random.Random], Iterator[Case]], int, int], ...] = (
     (numbers, 240, 18), (booleans, 80, 6), (magnitudes, 160, 12), (limits, 140, 10), (vectors, 150, 12),
-    (other_values, 60, 6), (no_effect, 90, 10), (names, 110, 10), (options.too_much, 80, 10), (options.lists, 90, 10),
-    (options.numbers, 160, 14), (options.verbs, 60, 6), (options.settings, 90, 8), (files.scenario_files, 90, 10),
-    (files.references, 50, 6), (files.extends, 50, 6), (options.legitimate, 120, 14),
+    (other_values, 60, 6), (no_effect, 200, 10), (names, 110, 10), (options.too_much, 80, 10), (options.lists, 90, 10),
+    (options.numbers, 160, 14), (options.verbs, 60, 6), (options.settings, 90, 8), (files.scenario_files, 200, 10),
+    (files.references, 50, 6), (files.extends, 50, 6), (options.legitimate, 400, 14),
 )  # fmt: skip
 """(class, at most so many in the long fuzz, in the default suite)."""
 

@@ -21,6 +21,7 @@ from .harness import fluidbench, nothing_runs
 from .leaves import OWN, full, leaves, table
 from .toml import dump
 
+pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")  # the program does not make errors of them
 CALM = settings(
     max_examples=60, deadline=None, derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
