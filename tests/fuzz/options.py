@@ -144,7 +144,7 @@ def verbs(rng: random.Random) -> Iterator[Case]:
         yield Case(sort, ("render", where), names=told, files={"file": b"x"}, folders=("empty",))
     for junk in (b"", b"\x00\xff" * 50, b"[]", b"5", b"{}", b"null", b'{"verdict": "completed"}', b'{"input": 5}'):
         files = {"run/record.json": junk, "run/final.npz": junk}
-        yield Case(sort, ("render", "run"), names=("record.json", "no run"), files=files)
+        yield Case(sort, ("render", "run"), names=("record.json", "no run", "no particles"), files=files)
 
 
 def settings(rng: random.Random) -> Iterator[Case]:
