@@ -22,7 +22,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     quiet_warp()
     from .measure.ledger import final_lengths, ledger, lengths
     from .measure.reference import answers
-    from .measure.tower import is_tower, success
+    from .measure.tower import is_tower, success, verdict_of
     from .simulation import Simulation, Verdict
     from .solver import approximations, get_solver
 
@@ -61,12 +61,14 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         frames = [folder / f"frame_{i:04d}.npz" for i in range(len(rows))]
     complete = outcome.verdict is Verdict.COMPLETED
     final = {**ledger(frame, scenario), **final_lengths(frame, scenario)} if complete else {}
+    compared, not_compared = answers(scenario, series, final) if complete else ([], [])
+    criteria = success(scenario, final, series) if complete and is_tower(scenario) else []
     record = job.heading() | {
         "seed": scenario.seed, "spacing_m": scenario.spacing,
         "verdict": str(outcome.verdict), "reason": outcome.reason,
         "measures": final,
-        "answers": [asdict(a) for a in answers(scenario, series, final)] if complete else [],
-        "success": success(scenario, final, series) if complete and is_tower(scenario) else [],
+        "answers": [asdict(a) for a in compared], "not_compared": not_compared,
+        "success": criteria, "print": str(verdict_of(criteria)) if criteria else "",
         "cost": cost(outcome, simulation, time.perf_counter() - start),
         "launches": {
             "per_substep": simulation.substep_launches.count,

@@ -64,7 +64,7 @@ def load(
         overrides = dict(parse_override(text) for text in overrides)
     for key, value in (overrides or {}).items():
         assign(table, key, value)
-    return validate(table, str(path))
+    return validate(table, f"{path} with --set" if overrides else str(path))
 
 
 def _coarser(table: dict[str, Any]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from typing import Any
 
 from .errors import Obstacle, UserError
 from .offspring import command, environment
-from .store import key_of, remove_quietly, write_atomically, write_record
+from .store import key_of, make_way, write_atomically, write_record
 from .target import HERE, Target
 
 PROGRESS, OBSTACLE = "@progress ", "@obstacle "
@@ -67,8 +67,7 @@ def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | 
     Raises Obstacle where a result cannot be written.
     """
     write_atomically(folder / "job.json", json.dumps(asdict(job), indent=1))
-    for name in ("record.json", "series.parquet", "final.npz"):
-        _make_way(folder / name)
+    _clear(folder)
     kills = _oom_kills()
     code, timed, obstacle = _attend(job, folder, progress)
     if obstacle:
@@ -77,14 +76,14 @@ def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | 
     return record if record is not None and code == 0 else _post_mortem(job, folder, code, timed, _oom_kills() > kills)
 
 
-def _make_way(path: Path) -> None:
-    """Remove what lies where a result will be, were it a folder."""
-    import shutil
-
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        remove_quietly(path)
+def _clear(folder: Path) -> None:
+    """Remove what an earlier run has left where results will be; raises Obstacle where that cannot be."""
+    for path in (folder / name for name in ("record.json", "series.parquet", "final.npz", "log.txt")):
+        try:
+            make_way(path)
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise Obstacle(f"cannot write {path}: {error.strerror}") from None
 
 
 def _attend(
@@ -93,7 +92,6 @@ def _attend(
     """Start the child and listen until it ends: (exit code, whether it was stopped for its time, what kept it)."""
     limit = None if job.wall_limit is None else job.wall_limit + GRACE
     timed, obstacle = threading.Event(), ""
-    _make_way(folder / "log.txt")
     try:
         log = (folder / "log.txt").open("w")
     except OSError as error:

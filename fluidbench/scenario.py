@@ -6,7 +6,7 @@ It is read from TOML (`load`), or built in Python from the same classes.
 
 import math
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -15,7 +15,7 @@ from .body import CORNERS, Body
 from .collider import Collider
 from .errors import quoted
 from .material import Material
-from .model import Matrix, Model, NonNegative, Positive, Vector
+from .model import LEAST, Matrix, Model, NonNegative, Positive, Vector
 from .toolpath import Toolpath, Track
 
 ADDRESSABLE = 2**26  # particles: neighbour lists keep 26 bits for an index
@@ -61,6 +61,7 @@ class Walls(Model):
 class Domain(Model):
     """The box in which everything happens; its faces are the walls."""
 
+    judged_later: ClassVar = ("lower", "upper")
     lower: Vector = Field(description="lower corner [m]")
     upper: Vector = Field(description="upper corner [m]")
     walls: Walls = Walls()
@@ -113,6 +114,7 @@ class Nozzle(Model):
 class Scenario(Model):
     """One experiment, the same for every method."""
 
+    judged_later: ClassVar = ("pool",)
     name: str = Field("unnamed", description="short name, used for folders")
     title: str = Field("", description="one line for people")
     domain: Domain
@@ -174,22 +176,26 @@ class Scenario(Model):
     def _check_size(self) -> None:
         """Enough room in memory and in single precision, before anything is laid out."""
         d, domain = self.spacing, self.domain
-        far = max(map(abs, (*domain.lower, *domain.upper)))
-        if far > RESOLVED * d:
-            raise ValueError(
-                f"the domain reaches to {far:.6g} m, {far / d:.3g} spacings from the origin; single precision resolves "
-                f"positions up to {RESOLVED} spacings ({RESOLVED * d:.3g} m): use a larger spacing or a smaller domain"
-            )
-        boxes = [float(np.prod(2.0 * body.extent / d + 1.0)) for body in self.bodies]
+        boxes = [math.prod(2.0 * float(edge) / d + 1.0 for edge in body.extent) for body in self.bodies]
         stream = 0.0
         if self.nozzle is not None:
             stream = self.nozzle.rate * self.duration / d**3 + (self.nozzle.diameter / d + 5.0) ** 2
         expansion = self.material.expansion
         most = (sum(boxes) + stream) * (1.0 if expansion is None else 2.0 * expansion.ratio)
         if self.pool is not None and self.pool > ADDRESSABLE:
-            raise ValueError(f"pool = {self.pool:.6g}: {_too_many(self.pool)}")
+            raise ValueError(f"pool = {float(self.pool):.6g}: {_too_many(self.pool)}")
         if most > 8.0 * ADDRESSABLE:  # bodies may fill little of their boxes; the exact count is judged later
             raise ValueError(f"spacing = {d:g} m: bodies and nozzle would be {_too_many(most)}")
+        far = max(map(abs, (*domain.lower, *domain.upper)))
+        if far > RESOLVED * d:
+            cells = math.prod((high - low) / d for low, high in zip(domain.lower, domain.upper, strict=True))
+            raise ValueError(
+                f"domain: it reaches to {far:.6g} m, {far / d:.3g} spacings, and holds as much as {_too_many(cells)}; "
+                f"single precision resolves positions up to {RESOLVED} spacings ({RESOLVED * d:.3g} m): use a larger "
+                "spacing or a smaller domain"
+            )
+        if 0 < abs(self.material.poisson_ratio) < LEAST:
+            raise ValueError(f"material.poisson_ratio = {self.material.poisson_ratio:g} is beyond any physics; give 0")
 
     def _check_time(self) -> None:
         """A number of ticks and outputs that a computer comes to the end of."""
@@ -392,7 +398,7 @@ def _too_many(particles: float) -> str:
     """What a number of particles would take, and what there is."""
     import psutil
 
-    there = psutil.virtual_memory().available / 2**30
+    there, particles = psutil.virtual_memory().available / 2**30, float(particles)
     return (
         f"{particles:.3g} particles, at some 300 bytes each {300 * particles / 2**30:.3g} GiB at least; "
         f"{ADDRESSABLE} can be addressed, and this machine has {there:.3g} GiB left"

@@ -1,6 +1,7 @@
 """Results on disk: one folder a run, written atomically, found again by what went into it, trusted only if whole."""
 
 import hashlib
+import itertools
 import json
 import os
 import tempfile
@@ -9,12 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import Obstacle, UserError
+from .errors import Obstacle, UserError, quoted
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RECORD, SEAL, CLAIM = "record.json", "seal", ".claim"
+RECORD, SEAL, CLAIM = "record.json", "seal", "claim.lock"
+PATIENCE = 5.0  # seconds after which somebody who waits for a claim is told
 PART = ".part"
 
 
@@ -36,6 +38,7 @@ def write_atomically(path: Path, data: bytes | str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_bytes(data.encode() if isinstance(data, str) else data)
+        make_way(path)
         part.replace(path)
     except OSError as error:
         remove_quietly(part)
@@ -43,6 +46,16 @@ def write_atomically(path: Path, data: bytes | str) -> None:
     except BaseException:
         remove_quietly(part)
         raise
+
+
+def make_way(path: Path) -> None:
+    """Clear a folder from where a file will be; one that holds something is put aside, under another name."""
+    if path.is_dir() and not path.is_symlink():
+        try:
+            path.rmdir()
+        except OSError:
+            aside = (path.with_name(f"{path.name}.aside-{i}") for i in itertools.count(1))
+            path.rename(next(name for name in aside if not name.exists()))
 
 
 def remove_quietly(path: Path) -> None:
@@ -116,7 +129,8 @@ class Store:
             _try_to_write(root)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
-            raise UserError(f"cannot write to the output folder {root}: {reason}; choose another with --out") from None
+            where = quoted(str(root))[1:-1]
+            raise UserError(f"cannot write to the output folder {where}: {reason}; choose another with --out") from None
 
     def folder(self, name: str, inputs: Mapping[str, Any]) -> Path:
         return self.root / "runs" / f"{name}-{key_of(inputs)}"
@@ -146,14 +160,19 @@ def _try_to_write(root: Path) -> None:
 
 
 @contextmanager
-def claimed(folder: Path) -> Iterator[None]:
-    """Hold a run's folder: of two studies that want the same run the second waits, and finds it finished."""
-    from filelock import FileLock
+def claimed(folder: Path, note: Callable[[str], None]) -> Iterator[None]:
+    """Hold a run's folder: of two studies that want the same run the second waits, and finds it finished. The claim of
+    a process that was killed does not hold."""
+    from filelock import SoftFileLock, Timeout
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(folder / CLAIM)
-        lock.acquire()
+        lock = SoftFileLock(folder / CLAIM)
+        try:
+            lock.acquire(timeout=PATIENCE)
+        except Timeout:
+            note(f"waiting for {folder.name}, which another process makes (it is gone? delete {folder / CLAIM})")
+            lock.acquire()
     except OSError as error:
         raise Obstacle(f"cannot write to {folder}: {error.strerror}") from None
     try:

@@ -6,7 +6,7 @@ from typing import NoReturn
 
 import typer
 
-from ..errors import Interrupted, Obstacle, UserError
+from ..errors import Interrupted, Obstacle, UserError, quoted
 
 from . import runs, studies, pictures, info  # isort: skip  (the order of the verbs in --help)
 from .app import app
@@ -33,7 +33,7 @@ def main() -> None:
         sys.stderr.close()
         sys.exit(1)
     except OSError as error:
-        where = f": {error.filename}" if error.filename else ""
+        where = f": {quoted(str(error.filename))[1:-1]}" if error.filename else ""
         _leave(1, f"{error.strerror or error}{where}; what is finished stays, the same command resumes")
     except Exception as error:
         if not isinstance(error, USAGE or ()):
@@ -48,7 +48,7 @@ def _terminated(*_: object) -> NoReturn:
 def _misused(error: Exception) -> NoReturn:
     """Help where a command was given nothing at all; otherwise what the parser says, in one line."""
     if type(error).__name__ == "NoArgsIsHelpError":
-        error.show()  # type: ignore[attr-defined]
+        print(error.format_message())  # type: ignore[attr-defined]
         sys.exit(2)
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "fluidbench"

@@ -19,6 +19,7 @@ app = typer.Typer(
 )  # fmt: skip
 
 MOST_REPEATS = 1000
+SHORTEST, LONGEST = 1e-3, 3.2e7  # wall time that a run may be given [s]
 ScenarioName = Annotated[str, typer.Argument(help="a shipped scenario (see `fluidbench list`) or a TOML file")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="override a key, e.g. material.yield_stress=50")]
 Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], instead of the scenario's")]
@@ -41,8 +42,8 @@ Frames = Annotated[bool, typer.Option("--frames", help="keep a snapshot of every
 def load_scenario(name: str, settings: list[str] | None, spacing: float | None, quick: bool = False) -> "Scenario":
     from ..library import load
 
-    if spacing is not None:
-        positive(spacing, "--spacing")
+    if spacing is not None and not (math.isfinite(spacing) and spacing > 0):
+        raise UserError(f"--spacing takes a positive number of metres; got {spacing:g}")
     extra = [f"spacing={spacing!r}"] if spacing is not None else []
     return load(name, [*(settings or []), *extra], quick)
 
@@ -72,15 +73,15 @@ def methods_of(solvers: str | None) -> list[str]:
 
 def positive(value: float, option: str, zero: bool = False) -> float:
     """The value; raises UserError unless it is finite and positive (or `zero`)."""
-    if not math.isfinite(value) or value < 0 or (value == 0 and not zero):
+    if not math.isfinite(value) or value < 0 or (value == 0 and not zero) or 0 < value < 1e-9:
         raise UserError(f"{option} takes a {'number of 0 or more' if zero else 'positive number'}; got {value:g}")
     return value
 
 
 def seconds(value: float, option: str, zero: bool = False) -> float:
     """The value; raises UserError unless it is a time that a run can take, up to a year [s]."""
-    if positive(value, option, zero) > 3.2e7:
-        raise UserError(f"{option} takes seconds, up to a year; got {value:g}")
+    if positive(value, option, zero) > LONGEST or 0 < value < SHORTEST:
+        raise UserError(f"{option} takes seconds, from {SHORTEST:g} up to a year; got {value:g}")
     return value
 
 
@@ -174,7 +175,7 @@ def fraction(text: str) -> float:
 
 def count_of(text: str, option: str) -> int:
     """'298000' -> 298000; raises UserError for what is no positive whole number."""
-    if not (text.isascii() and text.isdecimal()) or len(text) > 12 or int(text) == 0:
+    if not (text.isascii() and text.isdecimal()) or len(text) > 30 or int(text) == 0:
         raise UserError(f"{option} takes whole numbers such as 298000, or fit; got {quoted(text)}")
     return int(text)
 
@@ -193,6 +194,6 @@ def budget_of(text: str | None) -> tuple[float, float]:
         value = float(word[:-1] if scale else word) * (scale or 1.0)
     except ValueError:
         value = -1.0
-    if not 0 < value < math.inf:
+    if not SHORTEST <= value <= LONGEST:
         raise UserError(f"--budget takes a time such as 60s, 5m or 1h, or realtime; got {quoted(text)}")
     return value, math.inf

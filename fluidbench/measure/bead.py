@@ -19,15 +19,22 @@ class Bead:
     height: np.ndarray  # [m]
     area: np.ndarray  # [m^2]
     middle: Section
+    laid: float = 1.0  # share of the path that the nozzle has come
+
+    @property
+    def _inner(self) -> np.ndarray:
+        share = self.station / (self.laid * self.station[-1])
+        return (share >= MIDDLE[0]) & (share <= MIDDLE[1])
 
     def _mean(self, values: np.ndarray) -> float:
-        share = self.station / self.station[-1]
-        return float(values[(share >= MIDDLE[0]) & (share <= MIDDLE[1])].mean())
+        return float(values[self._inner].mean())
 
     def summary(self, layers: int) -> dict[str, float]:
-        """Averages over the middle 60 % of the path, per layer where that is meant."""
-        share = self.station / self.station[-1]
-        inner = self.area[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
+        """Averages over the middle 60 % of what was laid of the path, per layer where that is meant; nothing where that
+        is too short to have a middle."""
+        if not self._inner.any():
+            return {}
+        inner = self.area[self._inner]
         return {
             "bead_width_m": self._mean(self.width),
             "bead_height_m": self._mean(self.height),
@@ -36,8 +43,9 @@ class Bead:
         }
 
 
-def measure_bead(deposit: Deposit, scenario: Scenario) -> Bead | None:
-    """Sections every spacing along the first layer's path; None without a moving nozzle."""
+def measure_bead(deposit: Deposit, scenario: Scenario, laid: float = 1.0) -> Bead | None:
+    """Sections every spacing along the first layer's path, of which the nozzle has come the share `laid`; None without
+    a moving nozzle."""
     path, nozzle = scenario.toolpath, scenario.nozzle
     if path is None or nozzle is None or path.speed == 0:
         return None
@@ -59,7 +67,17 @@ def measure_bead(deposit: Deposit, scenario: Scenario) -> Bead | None:
         for p, i in zip(points, leg, strict=True)
     ]
     columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area"))
-    return Bead(station, *columns, middle=sections[count // 2])
+    return Bead(station, *columns, middle=sections[int(laid * (count // 2))], laid=laid)
+
+
+def laid_share(birth_time: np.ndarray, scenario: Scenario) -> float:
+    """Share of the first layer's path that the nozzle has come when the last of these particles left it."""
+    path, track, nozzle = scenario.toolpath, scenario.track, scenario.nozzle
+    if path is None or track is None or nozzle is None or path.speed == 0 or not len(birth_time):
+        return 1.0
+    disc = scenario.spacing * (1.0 + path.speed / nozzle.speed)  # that the last of them may have been early
+    come = float(track.extruded(float(birth_time.max()))) * path.speed + disc
+    return min(come / path.length(), 1.0)
 
 
 def layer_heights(position: np.ndarray, birth_time: np.ndarray, scenario: Scenario) -> list[float]:

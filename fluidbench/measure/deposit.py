@@ -65,6 +65,10 @@ class Deposit:
         place = np.moveaxis((points - self.origin) / self.spacing, -1, 0)
         return map_coordinates(self._spline, place, order=3, mode="nearest", prefilter=False)
 
+    def place(self, point: np.ndarray) -> np.ndarray:
+        """Indices (i, j) of the column of cells that a point (x, y) [m] lies in; they may be beyond the field."""
+        return np.rint((point - self.origin[:2]) / self.spacing).astype(int)
+
     def column_heights(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(x (nx,), y (ny,), height (nx, ny)) [m]: the material in each vertical column, as if it were solid."""
         x = self.origin[0] + self.spacing * np.arange(self.fill.shape[0])
@@ -78,10 +82,13 @@ class Deposit:
             gx = self.origin[0] + self.spacing * np.arange(fill.shape[0])[:, None] - x
             gy = self.origin[1] + self.spacing * np.arange(fill.shape[1])[None, :] - y
             fill = np.where((np.hypot(gx, gy) <= within)[..., None], fill, 0.0)
-        profile = fill.max(axis=(0, 1))
+        return self.level(fill.max(axis=(0, 1)), 0.0)
+
+    def level(self, profile: np.ndarray, empty: float = -np.inf) -> float:
+        """Height at which a profile over the field's layers is half full for the last time [m]; or `empty`."""
         filled = np.flatnonzero(profile >= HALF)
         if len(filled) == 0:
-            return 0.0
+            return empty
         k = filled[-1]
         above = profile[k + 1] if k + 1 < len(profile) else 0.0
         step = (profile[k] - HALF) / max(profile[k] - above, 1e-12)

@@ -5,10 +5,10 @@ import numpy as np
 from ..layout import emitted
 from ..particles import CARRIED
 from ..scenario import Scenario
-from .bead import layer_heights, measure_bead
+from .bead import laid_share, layer_heights, measure_bead
 from .deposit import Deposit
 from .slump import measure_slump
-from .tower import family_spread, is_tower, measure_tower, progress
+from .tower import family_spread, is_tower, measure_tower, progress, standing
 
 Frame = dict[str, np.ndarray]
 
@@ -40,6 +40,8 @@ def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     deposit = deposit_of(frame, scenario)
     row = {"resolution_m": deposit.spacing, "top_m": deposit.top() - scenario.domain.lower[2]}
     row |= measure_slump(deposit, scenario)
+    if is_tower(scenario):
+        row |= standing(deposit, scenario)
     return row | progress(frame, scenario)
 
 
@@ -47,7 +49,8 @@ def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """`lengths` and what only the finished print shows: beads and layers."""
     row = lengths(frame, scenario)
     free = frame["held"] != CARRIED
-    bead = measure_bead(deposit_of(frame, scenario), scenario)
+    laid = laid_share(frame["birth_time"][free], scenario)
+    bead = measure_bead(deposit_of(frame, scenario), scenario, laid)
     if bead is not None and scenario.toolpath is not None:
         row |= bead.summary(scenario.toolpath.layers)
         for i, rise in enumerate(layer_heights(frame["position"][free], frame["birth_time"][free], scenario), 2):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from ..scenario import Scenario
 if TYPE_CHECKING:
     import pandas as pd
 
+ALIKE = 0.02  # relative difference of proportions up to which a reference is of the same body
 GATE_SHIFT = 0.3  # Martin & Moyce's clock starts when the gate does; their T may be late by this much
 
 
@@ -38,68 +40,107 @@ def table(name: str) -> pd.DataFrame:
     return pd.read_csv(Path(scenarios.__file__).parent / "reference" / f"{name}.csv", comment="#")
 
 
-def answers(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> list[Answer]:
-    """All references that apply to a finished run, given its measures over time and at the end."""
-    found = []
+class DoesNotApply(Exception):
+    """A reference that says nothing of this run; the message says why."""
+
+
+def answers(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> tuple[list[Answer], list[str]]:
+    """(all references that apply to a finished run, given its measures over time and at the end; one line for each that
+    does not apply, with the reason)."""
+    made: list[Callable[[], Answer]] = []
     if scenario.nozzle is not None:
-        found += _emission(scenario, series, final)
-    if scenario.reference == "viscoplastic_slump" and "slump" in final:
-        found.append(_slump(scenario, final["slump"]))
-    if scenario.reference == "martin_moyce_front" and "front_x_m" in series:
-        found.append(_front(scenario, series))
-    return found
+        made.append(lambda: _mass(scenario, series, final))
+        if "bead_area_m2" in final:
+            made.append(lambda: _area(scenario, series, final))
+    if scenario.reference == "viscoplastic_slump":
+        made.append(lambda: _slump(scenario, final))
+    if scenario.reference == "martin_moyce_front":
+        made.append(lambda: _front(scenario, series))
+    found, reasons = [], []
+    for answer in made:
+        try:
+            found.append(answer())
+        except DoesNotApply as reason:
+            reasons.append(str(reason))
+    return found, reasons
 
 
-def _emission(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> list[Answer]:
-    """Mass rho Q t, exact to one disc, and the bead's section Q / V."""
-    nozzle, path, track = scenario.nozzle, scenario.toolpath, scenario.track
-    assert nozzle is not None and path is not None and track is not None
+def _mass(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> Answer:
+    """Mass rho Q t, exact to one disc."""
+    nozzle, track = scenario.nozzle, scenario.track
+    assert nozzle is not None and track is not None
     t = float(series["time_s"].iloc[-1])
     expected = scenario.material.density * nozzle.rate * float(track.extruded(t))
     disc = Stream(scenario).volume * len(Stream(scenario).offsets) * scenario.material.density
     off = final["mass_kg"] - expected
-    found = [
-        Answer("emitted mass [kg]", final["mass_kg"], expected, abs(off) / disc, "in discs of one spacing", "rho Q t")
-    ]
-    if "bead_area_m2" in final:
-        area, source = nozzle.rate / path.speed, "Q / V"
-        if (expansion := scenario.material.expansion) is not None:
-            ages = t - np.linspace(0.0, track.end, 200)[track.velocity(np.linspace(0.0, track.end, 200)).any(axis=1)]
-            area *= float(np.mean([expansion.volume_ratio(age) for age in ages]))
-            source = "R Q / V"
-        got = final["bead_area_m2"]
-        found.append(Answer("bead area [m^2]", got, area, abs(got / area - 1.0), "relative", source))
-    return found
-
-
-def _slump(scenario: Scenario, slump: float) -> Answer:
-    """s' of a von Mises cylinder, H / R = 2, rough floor, against two independent computations."""
-    body = scenario.bodies[0]
-    height = 2.0 * float(body.extent[2])
-    stress = scenario.material.yield_stress or 0.0
-    tau = stress / (scenario.material.density * abs(float(scenario.acceleration[2])) * height)
-    data = table("viscoplastic_slump_crosscheck")
-    best = data[["slump_vof", "slump_mpm_extrap"]].mean(axis=1)
-    expected = float(np.interp(tau, data["tau_prime"], best))
-    note = "absolute" if 0.05 <= tau <= 0.3 else "absolute; tau' outside the table, its end value taken"
     return Answer(
-        f"slump at tau' = {tau:.3g}", slump, expected, abs(slump - expected), note, "viscoplastic_slump_crosscheck.csv"
+        "emitted mass [kg]", final["mass_kg"], expected, abs(off) / disc, "in discs of one spacing", "rho Q t"
     )
+
+
+def _area(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> Answer:
+    """The bead's section Q / V, times what it has expanded, once the whole path was travelled."""
+    nozzle, path, track = scenario.nozzle, scenario.toolpath, scenario.track
+    assert nozzle is not None and path is not None and track is not None
+    t = float(series["time_s"].iloc[-1])
+    if t < track.end * (1.0 - 1e-6):
+        raise DoesNotApply(f"bead area against Q / V: the path takes {track.end:.3g} s, the run ends at {t:.3g} s")
+    area, source = nozzle.rate / path.speed, "Q / V"
+    if (expansion := scenario.material.expansion) is not None:
+        ages = t - np.linspace(0.0, track.end, 200)[track.velocity(np.linspace(0.0, track.end, 200)).any(axis=1)]
+        area *= float(np.mean([expansion.volume_ratio(age) for age in ages]))
+        source = "R Q / V"
+    got = final["bead_area_m2"]
+    return Answer("bead area [m^2]", got, area, abs(got / area - 1.0), "relative", source)
+
+
+def _slump(scenario: Scenario, final: dict[str, float]) -> Answer:
+    """s' of a von Mises cylinder, H / R = 2, rough floor, against two independent computations."""
+    what, g = "slump against the crosscheck", -float(scenario.acceleration[2])
+    body = scenario.bodies[0] if scenario.bodies else None
+    if "slump" not in final or body is None or body.kind != "cylinder" or not scenario.material.yield_stress or g <= 0:
+        raise DoesNotApply(f"{what}: it is of one cylinder with a yield stress that slumps under its weight")
+    height = 2.0 * float(body.extent[2])
+    if abs(height / float(body.extent[0]) - 2.0) > ALIKE or scenario.domain.walls.z_lower != "stick":
+        raise DoesNotApply(f"{what}: it is of H / R = 2 on a floor that sticks")
+    tau = scenario.material.yield_stress / (scenario.material.density * g * height)
+    data = table("viscoplastic_slump_crosscheck")
+    low, high = data["tau_prime"].min(), data["tau_prime"].max()
+    if tau < float(low) or tau > float(high):
+        raise DoesNotApply(f"{what}: tau' = {tau:.3g} lies outside the table, {low:g} .. {high:g}")
+    expected = float(np.interp(tau, data["tau_prime"], data[["slump_vof", "slump_mpm_extrap"]].mean(axis=1)))
+    off = abs(final["slump"] - expected)
+    source = "viscoplastic_slump_crosscheck.csv"
+    return Answer(f"slump at tau' = {tau:.3g}", final["slump"], expected, off, "absolute", source)
+
+
+def martin_moyce(scenario: Scenario) -> tuple[float, float, pd.DataFrame]:
+    """(width a of the column [m], T over time sqrt(n^2 g / a) [1/s], table of T and Z) for the scenario's column, the
+    table being that of its proportions n^2 = 1 or 2; raises DoesNotApply for others."""
+    g = -float(scenario.acceleration[2])
+    body = scenario.bodies[0] if scenario.bodies else None
+    if body is None or body.kind != "box" or g <= 0:
+        raise DoesNotApply("front against Martin & Moyce: it is of one column of a liquid in a box, with gravity")
+    a, ratio = float(2.0 * body.extent[0]), float(body.extent[2] / body.extent[0])
+    nearest = min((1, 2), key=lambda n: abs(ratio - n))
+    if abs(ratio / nearest - 1.0) > ALIKE:
+        raise DoesNotApply(f"front against Martin & Moyce: tables are of n^2 = 1 and 2, the column has {ratio:.3g}")
+    data = table(f"dam_break_martin_moyce_front_n2_{nearest}")
+    return a, float(np.sqrt(ratio * g / a)), data.loc[data["kind"] == "table"]
 
 
 def _front(scenario: Scenario, series: pd.DataFrame) -> Answer:
     """RMS of (Z - Z_ref) / Z_ref for 0.84 <= T <= 3.33 after the best shift of the clock within 0.3."""
-    a = float(2.0 * scenario.bodies[0].extent[0])
-    g = abs(float(scenario.acceleration[2]))
-    ratio = float(scenario.bodies[0].extent[2] / scenario.bodies[0].extent[0])
-    data = table(f"dam_break_martin_moyce_front_n2_{2 if ratio > 1.5 else 1}")
-    data = data[(data["kind"] == "table") & data["T"].between(0.84, 3.33)]
-    clock = series["time_s"].to_numpy() * np.sqrt(ratio * g / a)
+    if "front_x_m" not in series:
+        raise DoesNotApply("front against Martin & Moyce: it is of one column of a liquid in a box, with gravity")
+    a, rate, data = martin_moyce(scenario)
+    data = data[data["T"].between(0.84, 3.33)]
+    clock = series["time_s"].to_numpy() * rate
     shifts = np.linspace(-GATE_SHIFT, GATE_SHIFT, 61)
     reached = [data["T"].to_numpy() + shift for shift in shifts]
     if clock[-1] < data["T"].max() - GATE_SHIFT:
-        return Answer(
-            "front RMS", float("nan"), 0.0, float("nan"), "run too short for the table", "Martin & Moyce 1952"
+        raise DoesNotApply(
+            f"front against Martin & Moyce: the table ends at T = {data['T'].max():g}, the run at T = {clock[-1]:.3g}"
         )
     errors = [
         float(np.sqrt(np.mean((np.interp(t, clock, series["front_x_m"] / a) / data["Z"] - 1.0) ** 2))) for t in reached

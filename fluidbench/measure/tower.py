@@ -1,36 +1,52 @@
-"""Towers of layers: what each layer is like, how the whole stands, and whether it is a success.
+"""Towers of layers: what each layer is like, how the whole stands, and what became of the print.
 
-Particles belong to the layer during which they (or their ancestor) left the nozzle.
+Particles belong to the layer during which they (or their ancestor) left the nozzle. All is judged along the middle of
+the path, in sectors no shorter than the deposit resolves, from what fills space: a lone particle decides nothing.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from ..particles import CARRIED
 from ..scenario import Scenario
+from .deposit import Deposit
 
-SECTORS = 48  # parts of a path in which a layer must have material
-THIN = 0.4  # share of its usual mass per sector below which a layer is broken
+SECTORS = 48  # parts of a path in which a layer must have material, at most
+SHORTEST = 3.0  # spacings that a sector is long, at least: shorter ones hold material by chance
+THIN = 0.4  # share of the mass laid per length below which a layer is broken
+BESIDE = 1.5  # nozzle diameters from the path (of expanded material) beyond which material is not its layer any more
 SPAN = (0.05, 0.95)  # quantiles of mass between which a layer's width is taken
-HEIGHT_TOLERANCE, RADIUS_TOLERANCE, CREEP = 0.25, 0.10, 0.05
+HEIGHT_TOLERANCE, RADIUS_TOLERANCE, CREEP, WHOLE = 0.25, 0.10, 0.05, 0.95
 Frame = Mapping[str, np.ndarray]
+
+
+class Print(StrEnum):
+    """What became of a print, the worst first."""
+
+    INCOMPLETE = "incomplete"
+    COLLAPSED = "collapsed"
+    BROKEN = "broken"
+    DEFORMED = "deformed"
+    SOUND = "sound"
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """One condition of success, as measured and as wanted; `met` is for it alone."""
+    """One condition of success, as measured and as wanted; `met` is for it alone, `failure` what it says if not."""
 
     name: str
     measured: float
     wanted: str
     met: bool
+    failure: Print
 
 
 def is_tower(scenario: Scenario) -> bool:
-    return scenario.toolpath is not None and scenario.toolpath.layers > 1
+    return scenario.toolpath is not None and scenario.toolpath.layers > 1 and scenario.toolpath.speed > 0
 
 
 def layer_of(frame: Frame, scenario: Scenario) -> np.ndarray:
@@ -41,7 +57,7 @@ def layer_of(frame: Frame, scenario: Scenario) -> np.ndarray:
 
 
 def measure_tower(frame: Frame, scenario: Scenario) -> dict[str, float]:
-    """Per layer: mean height, width, continuity and, on a ring, radius and drift of the centre; lengths in metres."""
+    """Per layer: level, width, continuity and, on a ring, radius and drift of the centre; lengths in metres."""
     path = scenario.toolpath
     assert path is not None
     layer, mass = layer_of(frame, scenario), frame["mass"].astype(float)
@@ -54,14 +70,73 @@ def measure_tower(frame: Frame, scenario: Scenario) -> dict[str, float]:
         along, across, up = _path_coordinates(x[own], scenario)
         m = mass[own]
         name = f"layer_{k + 1}"
-        row[f"{name}_level_m"] = float(np.average(up, weights=m))
+        inner = _in_middle(along, scenario)
+        if inner.any():
+            row[f"{name}_level_m"] = _trimmed_mean(up[inner], m[inner])
         row[f"{name}_width_m"] = _spread(across, m) / (SPAN[1] - SPAN[0])
-        row[f"{name}_continuity"] = _continuity(along, m)
+        row[f"{name}_continuity"] = _continuity(along, across, m, scenario)
         if path.kind == "ring" and path.center is not None and path.radius is not None:
             row[f"{name}_radius_m"] = path.radius + float(np.average(across, weights=m))
             center = np.average(x[own, :2], axis=0, weights=m)
             row[f"{name}_drift_m"] = float(np.hypot(*(center - path.center)))
     return row
+
+
+def standing(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
+    """How high material stands on the path: the median over its sectors [m], and the share of sectors in which that is
+    within HEIGHT_TOLERANCE of the plan or above."""
+    heights = path_heights(deposit, scenario)
+    low = (1.0 - HEIGHT_TOLERANCE) * plan_height(scenario)
+    return {"print_height_m": float(np.median(heights)), "print_standing": float((heights >= low).mean())}
+
+
+def path_heights(deposit: Deposit, scenario: Scenario) -> np.ndarray:
+    """Height of the deposit over each sector of the middle of the path, shape (sectors,) [m]: where the field, averaged
+    along the sector, is half full for the last time, at the best of the lines within a quarter of the nozzle from the
+    path. A lone particle fills no half of a sector that is SHORTEST cells long."""
+    path, nozzle = scenario.toolpath, scenario.nozzle
+    assert path is not None and nozzle is not None
+    reach = max(nozzle.diameter / 4, scenario.spacing)
+    corners, edges = path.corners(), _sector_edges(scenario)
+    low, high = (deposit.place(c) for c in (corners.min(axis=0) - reach, corners.max(axis=0) + reach))
+    i, j = (grid.ravel() for grid in np.meshgrid(*map(np.arange, low, high + 1), indexing="ij"))
+    x, y = (deposit.origin[axis] + deposit.spacing * index for axis, index in enumerate((i, j)))
+    along, across, _ = _path_coordinates(np.stack([x, y, np.zeros(len(x))], axis=1), scenario)
+    sector, line = np.searchsorted(edges, along, side="right") - 1, np.rint(across / deposit.spacing).astype(int)
+    lines = int(np.ceil(reach / deposit.spacing))
+    over = (np.abs(line) <= lines) & (np.abs(across) <= reach) & (sector >= 0) & (sector < len(edges) - 1)
+    place = sector[over] * (2 * lines + 1) + line[over] + lines
+    size = (len(edges) - 1) * (2 * lines + 1)
+    columns = np.maximum(np.bincount(place, minlength=size), 1)
+    inside = ((i >= 0) & (i < deposit.fill.shape[0]) & (j >= 0) & (j < deposit.fill.shape[1]))[over]
+    filled = np.zeros((size, deposit.fill.shape[2]))
+    np.add.at(filled, place[inside], deposit.fill[i[over][inside], j[over][inside]])
+    profiles = (filled / columns[:, None]).reshape(len(edges) - 1, -1, deposit.fill.shape[2]).max(axis=1)
+    floor = scenario.domain.lower[2]
+    return np.array([max(deposit.level(profile) - floor, 0.0) for profile in profiles])
+
+
+def plan_height(scenario: Scenario) -> float:
+    """Height of the print as planned: its layers over one another [m]."""
+    path, nozzle = scenario.toolpath, scenario.nozzle
+    assert path is not None and nozzle is not None
+    return path.layers * (path.layer_height or nozzle.standoff)
+
+
+def _sector_edges(scenario: Scenario) -> np.ndarray:
+    """Edges of the sectors of the middle of the path, as shares of it: all of a closed path; of an open one all but a
+    nozzle's diameter (a quarter at most) at each end, where the nozzle turns."""
+    path, nozzle = scenario.toolpath, scenario.nozzle
+    assert path is not None and nozzle is not None
+    length = path.length()
+    margin = 0.0 if path.kind == "ring" else min(nozzle.diameter / length, 0.25)
+    count = int(np.clip(length * (1.0 - 2.0 * margin) / (SHORTEST * scenario.spacing), 1, SECTORS))
+    return np.linspace(margin, 1.0 - margin, count + 1)
+
+
+def _in_middle(along: np.ndarray, scenario: Scenario) -> np.ndarray:
+    edges = _sector_edges(scenario)
+    return (along >= edges[0]) & (along <= edges[-1])
 
 
 def _path_coordinates(x: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -90,22 +165,39 @@ def _path_coordinates(x: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, np
     return along, across, up
 
 
+def _quantile(values: np.ndarray, weights: np.ndarray, share: float) -> float:
+    """The value below which this share of mass lies."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) / weights.sum()
+    return float(values[order][min(np.searchsorted(below, share), len(order) - 1)])
+
+
+def _trimmed_mean(values: np.ndarray, weights: np.ndarray) -> float:
+    """Mean without the outermost mass on either side."""
+    low, high = (_quantile(values, weights, share) for share in SPAN)
+    kept = (values >= low) & (values <= high)
+    return float(np.average(values[kept], weights=weights[kept]))
+
+
 def _spread(values: np.ndarray, weights: np.ndarray) -> float:
     """Distance between two quantiles of mass."""
-    order = np.argsort(values)
-    share = np.cumsum(weights[order]) / weights.sum()
-    low, high = (values[order][min(np.searchsorted(share, q), len(order) - 1)] for q in SPAN)
-    return float(high - low)
+    return _quantile(values, weights, SPAN[1]) - _quantile(values, weights, SPAN[0])
 
 
-def _continuity(along: np.ndarray, mass: np.ndarray) -> float:
-    """Share of the path's sectors that hold at least THIN of the median mass."""
-    sectors = np.bincount(np.minimum((along * SECTORS).astype(int), SECTORS - 1), mass, minlength=SECTORS)
-    return float((sectors >= THIN * np.median(sectors)).mean())
+def _continuity(along: np.ndarray, across: np.ndarray, mass: np.ndarray, scenario: Scenario) -> float:
+    """Share of the sectors that hold, near the path, at least THIN of the mass that the nozzle lays per length."""
+    path, nozzle, expansion = scenario.toolpath, scenario.nozzle, scenario.material.expansion
+    assert path is not None and nozzle is not None
+    wide = BESIDE * nozzle.diameter * (1.0 if expansion is None else expansion.ratio ** (1 / 3))
+    near = np.abs(across) <= wide
+    edges = _sector_edges(scenario)
+    held, _ = np.histogram(along[near], edges, weights=mass[near])
+    laid = scenario.material.density * nozzle.rate / path.speed * path.length() * np.diff(edges)
+    return float((held >= THIN * laid).mean())
 
 
 def progress(frame: Frame, scenario: Scenario) -> dict[str, float]:
-    """What changes over time: share of mass that is cured to 95 %, and volume over fresh volume."""
+    """What changes over time: mean degree of cure, share of mass cured to 95 %, and volume over fresh volume."""
     free = frame["held"] != CARRIED
     row: dict[str, float] = {}
     m = scenario.material
@@ -113,7 +205,9 @@ def progress(frame: Frame, scenario: Scenario) -> dict[str, float]:
     if not len(mass):
         return row
     if m.cure is not None:
-        row["cured_share"] = float(mass[frame["phase"][free] >= 0.95 * m.cure.levels].sum() / mass.sum())
+        phase = frame["phase"][free]
+        row["mean_cure"] = float(phase @ mass / mass.sum() / m.cure.levels)
+        row["cured_share"] = float(mass[phase >= 0.95 * m.cure.levels].sum() / mass.sum())
     if m.expansion is not None:
         row["volume_growth"] = float(frame["volume"][free].astype(float).sum() * m.density / mass.sum())
     return row
@@ -136,23 +230,33 @@ def family_spread(frame: Frame, ancestors: int) -> float:
 def success(scenario: Scenario, measures: Mapping[str, float], series: Any) -> list[dict[str, Any]]:
     """The paper's conditions, each alone: layers complete and continuous, height and radius within tolerance, stable
     after the last layer. `series` is the table of measures over time."""
-    times, tops = series["time_s"].tolist(), series["top_m"].tolist()
-    path, track, nozzle = scenario.toolpath, scenario.track, scenario.nozzle
-    assert path is not None and track is not None and nozzle is not None
+    path, track = scenario.toolpath, scenario.track
+    assert path is not None and track is not None
     names = [f"layer_{k + 1}" for k in range(path.layers)]
     laid = [n for n in names if f"{n}_level_m" in measures]
+    end = float(series["time_s"].iloc[-1])
     worst = min((measures[f"{n}_continuity"] for n in laid), default=0.0)
-    top = tops[-1] if len(tops) else 0.0
-    plan = path.layers * (path.layer_height or nozzle.standoff)
+    tall = measures["print_height_m"] / plan_height(scenario)
+    stands = measures["print_standing"]
     found = [
-        Criterion("layers laid", len(laid), f"{path.layers}", len(laid) == path.layers),
-        Criterion("continuity of the worst layer", worst, ">= 0.95", worst >= 0.95),
-        Criterion("height over plan", top / plan, f"1 ± {HEIGHT_TOLERANCE:g}", abs(top / plan - 1) <= HEIGHT_TOLERANCE),
-    ]
+        Criterion("layers laid", len(laid), f"{path.layers}", len(laid) == path.layers, Print.INCOMPLETE),
+        Criterion("path travelled", min(end / track.end, 1.0), "1", end >= track.end * (1 - 1e-6), Print.INCOMPLETE),
+        Criterion("height over plan", tall, f"1 ± {HEIGHT_TOLERANCE:g}", abs(tall - 1) <= HEIGHT_TOLERANCE,
+                  Print.COLLAPSED if tall < 1 else Print.DEFORMED),
+        Criterion("share of the path that stands", stands, f">= {WHOLE:g}", stands >= WHOLE, Print.COLLAPSED),
+        Criterion("continuity of the worst layer", worst, f">= {WHOLE:g}", worst >= WHOLE, Print.BROKEN),
+    ]  # fmt: skip
     if path.kind == "ring" and path.radius:
         off = max((abs(measures[f"{n}_radius_m"] / path.radius - 1) for n in laid), default=1.0)
-        found.append(Criterion("worst radius error", off, f"<= {RADIUS_TOLERANCE:g}", off <= RADIUS_TOLERANCE))
-    after = [h for t, h in zip(times, tops, strict=True) if t >= track.end]
+        met = off <= RADIUS_TOLERANCE
+        found.append(Criterion("worst radius error", off, f"<= {RADIUS_TOLERANCE:g}", met, Print.DEFORMED))
+    after = series.loc[series["time_s"] >= track.end, "print_height_m"].tolist()
     sunk = 1.0 - after[-1] / after[0] if len(after) > 1 and after[0] > 0 else float("nan")
-    found.append(Criterion("sunk after the last layer", sunk, f"<= {CREEP:g}", bool(sunk <= CREEP)))
-    return [vars(c) | {"met": bool(c.met)} for c in found]
+    found.append(Criterion("sunk after the last layer", sunk, f"<= {CREEP:g}", bool(sunk <= CREEP), Print.DEFORMED))
+    return [vars(c) | {"met": bool(c.met), "failure": str(c.failure)} for c in found]
+
+
+def verdict_of(criteria: list[dict[str, Any]]) -> Print:
+    """What became of a print: the worst of what its unmet criteria say; settling that nobody saw says nothing."""
+    failures = {Print(c["failure"]) for c in criteria if not c["met"] and c["measured"] == c["measured"]}
+    return next((kind for kind in Print if kind in failures), Print.SOUND)

@@ -35,6 +35,10 @@ def publish(results: Sequence[Finished], root: Path, console: Console, label: st
     for table in tables:
         show(console, table)
     for result in results:
+        if result.ok and result.record.get("print", "sound") not in ("", "sound"):
+            unmet = [f"{c['name']} {c['measured']:.3g} (wanted {c['wanted']})" for c in result.record["success"]
+                     if not c["met"]]  # fmt: skip
+            console.print(f"{result.label}: the print is {result.record['print']}: {'; '.join(unmet)}", markup=False)
         if not result.ok:
             advice = ADVICE.get(result.verdict, "")
             console.print(f"{result.label}: {result.verdict}: {result.reason}; {advice}", markup=False)

@@ -3,17 +3,16 @@ snapshots, and a time series for ParaView."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import UserError, suggestion
+from ..errors import UserError, quoted, suggestion
 from ..particles import CARRIED
 from ..scenario import Scenario
-from ..store import RECORD, write_atomically
+from ..store import RECORD, read_record, write_atomically
 
 COLOURS = ("layer", "phase", "speed", "stress", "density", "height")
 WINDOW, TURNS, FPS = (1280, 960), 90, 20
@@ -25,15 +24,21 @@ def load(folder: Path) -> tuple[Scenario, list[dict[str, np.ndarray]]]:
 
     Raises UserError where there is no finished run.
     """
-    record_path = folder / RECORD
-    if not record_path.is_file():
-        raise UserError(f"{folder}: no run here (no {RECORD}); give a folder such as fluidbench-out/NAME/runs/...")
-    record = json.loads(record_path.read_text())
-    if "input" not in record or not (folder / "final.npz").is_file():
-        raise UserError(f"{folder}: the run has no particles to show ({record['verdict']}: {record.get('reason', '')})")
-    paths = sorted(folder.glob("frame_*.npz")) or [folder / "final.npz"]
+    shown = quoted(str(folder))[1:-1]
+    try:
+        there = (folder / RECORD).exists()
+    except (OSError, ValueError) as error:
+        raise UserError(f"{shown}: no run here ({getattr(error, 'strerror', None) or error})") from None
+    if not there:
+        raise UserError(f"{shown}: no run here (no {RECORD}); give a folder such as fluidbench-out/NAME/runs/...")
+    record, why = read_record(folder)
+    if record is None:
+        raise UserError(f"{shown}: {why}; the same command that made the run makes it again")
+    if "input" not in record or "final.npz" not in record["files"]:
+        raise UserError(f"{shown}: the run has no particles to show ({record['verdict']}: {record.get('reason', '')})")
+    kept = sorted(name for name in record["files"] if name.startswith("frame_")) or ["final.npz"]
     frames = []
-    for path in paths:
+    for path in (folder / name for name in kept):
         with np.load(path) as data:
             frame = {key: data[key] for key in data.files}
         free = frame["held"] != CARRIED

@@ -26,7 +26,7 @@ def report(
     machine = next((r.record["machine"] for r in chosen.runs if "machine" in r.record), {})
     return Report(
         "select", f"fluidbench select: {scenario.name}",
-        f"Tolerance {tolerance:.0%} of every length; budget: {_budget(budget, pace)}.",
+        f"Tolerance {100 * tolerance:.3g} % of every length; budget: {_budget(budget, pace)}.",
         _findings(scenario, name, chosen, tolerance, budget, pace), [_candidates(chosen, front), _evidence(chosen)],
         pd.DataFrame(rows), [_plot(chosen, front)], runs, "; ".join(f"{k} {v}" for k, v in machine.items()),
     )  # fmt: skip
@@ -51,7 +51,8 @@ def _findings(
     best, why = chosen.recommend(tolerance, budget, pace)
     if best is None:
         return [f"No recommendation: {why}.", *chosen.notes]
-    lines = [f"Recommended: {_words(best)}." + (f" But {why}." if why else "")]
+    lines = [f"Tolerance {100 * tolerance:.3g} %; budget: {_budget(budget, pace)}."]
+    lines.append(f"Recommended: {_words(best)}." + (f" But {why}." if why else ""))
     lines.append(
         f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}{best.run.target.options}"
     )
@@ -60,9 +61,7 @@ def _findings(
     if finer:
         lines.append(f"Twice as accurate: {_words(min(finer, key=lambda c: c.wall))}.")
     else:
-        lines.append(
-            "Twice as accurate: nothing tried; at first order it takes half the spacing, some 16 times the work."
-        )
+        lines.append(f"Twice as accurate: nothing tried; {_further(chosen, best)}.")
     if faster:
         lines.append(f"Twice as fast: {_words(min(faster, key=lambda c: c.error))}.")
     else:
@@ -71,6 +70,19 @@ def _findings(
         f"How sure: {confidence(chosen, tolerance)} (known answers: {', '.join(sorted(physics_of(scenario)))})."
     )
     return [*lines, *chosen.notes]
+
+
+def _further(chosen: Selection, best: Candidate) -> str:
+    """What half the error would take, where the errors tried say so."""
+    if not chosen.converges(best.method):
+        return f"the error of {best.method} does not fall with the spacing, so a finer one promises nothing"
+    order = chosen.order(best.method)
+    if not math.isfinite(order):
+        return f"the error of {best.method} is nothing but what cannot be measured"
+    factor = 2.0 ** (1.0 / order)
+    return (
+        f"at its observed order of {order:.2g} it takes {1 / factor:.2g} of the spacing, {factor**4:.0f} times the work"
+    )
 
 
 def _row(c: Candidate, best: bool) -> dict[str, float | str | bool]:

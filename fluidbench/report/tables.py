@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import mean, stdev
 from typing import TYPE_CHECKING, Any
 
 from ..study.compare import binding, lengths_of
 from ..study.execute import Finished
+from ..verdict import Evidence, evidence_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -74,7 +75,10 @@ def fidelity(results: Sequence[Finished]) -> Table:
     groups = by_method(results)
     table = Table("Fidelity", ["", *groups])
     table.rows.append(["verdict", *[", ".join(sorted({r["verdict"] for r in g})) for g in groups.values()]])
-    done = {name: [r for r in g if r["verdict"] == "completed"] for name, g in groups.items()}
+    done = {name: [r for r in g if evidence_of(r["verdict"]) is Evidence.RESULT] for name, g in groups.items()}
+    if any(r.get("print") for g in done.values() for r in g):
+        prints = [", ".join(sorted({r["print"] for r in g if r.get("print")})) or "-" for g in done.values()]
+        table.rows.append(["print", *prints])
     hidden = ("momentum", "angular", "center", "potential", "particles")
     keys = dict.fromkeys(k for g in done.values() for r in g for k in r["measures"] if not k.startswith(hidden))
     for key in keys:
@@ -86,6 +90,7 @@ def fidelity(results: Sequence[Finished]) -> Table:
 def against_reference(results: Sequence[Finished]) -> Table | None:
     """Measured value, reference and error of every answer; None when the scenario has none."""
     table = Table("Against references", ["", "method", "measured", "reference", "error", "measure", "source"])
+    reasons = dict.fromkeys(line for r in results for line in r.record.get("not_compared", []))
     for result in results:
         if result.record["repeat"] == 0:
             for a in result.record.get("answers", []):
@@ -93,7 +98,8 @@ def against_reference(results: Sequence[Finished]) -> Table | None:
                 error = f"{100 * a['error']:.2f} %" if percent else f"{a['error']:.4f}"
                 table.rows.append([a["quantity"], result.label, number(a["measured"]), number(a["reference"]), error,
                                    a["measure"], a["source"]])  # fmt: skip
-    return table if table.rows else None
+    table = replace(table, note="\n".join(f"not compared: {line}" for line in reasons))
+    return table if table.rows or reasons else None
 
 
 def successes(results: Sequence[Finished]) -> Table | None:

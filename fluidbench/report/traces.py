@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..measure.bead import measure_bead
+from ..measure.bead import laid_share, measure_bead
 from ..measure.ledger import deposit_of
-from ..measure.reference import table
+from ..measure.reference import DoesNotApply, martin_moyce
+from ..particles import CARRIED
 from ..scenario import Scenario
 from ..study.execute import Finished
 
@@ -74,7 +76,9 @@ def _bead_plots(done: Sequence[Finished], scenario: Scenario) -> list[Plot]:
     width = Plot("width", "bead width along the path", "distance along the path [mm]", "width [mm]")
     height = Plot("height", "bead height along the path", "distance along the path [mm]", "height [mm]")
     for result in done:
-        bead = measure_bead(deposit_of(load_frame(result), scenario), scenario)
+        frame = load_frame(result)
+        laid = laid_share(frame["birth_time"][frame["held"] != CARRIED], scenario)
+        bead = measure_bead(deposit_of(frame, scenario), scenario, laid)
         if bead is None:
             continue
         for i, outline in enumerate(outlines(bead.middle.across, bead.middle.up, bead.middle.fill)):
@@ -115,16 +119,15 @@ def _series_plots(done: Sequence[Finished], scenario: Scenario) -> list[Plot]:
                     Trace(result.label, series["time_s"].tolist(), series[column].tolist(), colour=colour(result.label))
                 )
         if column == "front_x_m" and scenario.reference == "martin_moyce_front" and plot.traces:
-            plot.traces.append(_martin_moyce(scenario))
+            with suppress(DoesNotApply):  # said beside the table of references
+                plot.traces.append(_martin_moyce(scenario))
         found.append(plot)
     return found
 
 
 def _martin_moyce(scenario: Scenario) -> Trace:
-    data = table("dam_break_martin_moyce_front_n2_2")
-    data = data[data["kind"] == "table"]
-    a = float(2.0 * scenario.bodies[0].extent[0])
-    clock = (data["T"] / np.sqrt(2.0 * 9.81 / a)).tolist()
+    a, rate, data = martin_moyce(scenario)
+    clock = (data["T"] / rate).tolist()
     return Trace("Martin & Moyce 1952 (gate clock)", clock, (a * data["Z"]).tolist(), style="points")
 
 

@@ -46,7 +46,7 @@ def tidy(results: Sequence[Finished]) -> pd.DataFrame:
             for k in ("scenario", "method", "device", "backend", "threads", "repeat", "seed", "spacing_m")
         }
         row |= {"verdict": result.verdict, "reason": result.reason, "reused": result.reused}
-        row |= record.get("measures", {})
+        row |= {"print": record.get("print", "")} | record.get("measures", {})
         row |= {f"error: {a['quantity']}": a["error"] for a in record.get("answers", [])}
         row |= record.get("cost", {})
         row["binding_bound"] = binding(record)

@@ -109,7 +109,7 @@ def execute(planned: Sequence[Job], store: Store, hooks: Hooks, workers: int = 1
 def _obtain(i: int, job: Job, store: Store, hooks: Hooks) -> Finished:
     """The run that a job asks for: as it was stored, or made now. Its folder is claimed meanwhile."""
     folder = store.folder(f"{job.scenario['name']}-{job.method}", job.inputs())
-    with claimed(folder):
+    with claimed(folder, hooks.note):
         record, why = store.record(folder, lambda found: misfit(found, job))
         if why:
             hooks.note(f"{folder.name} is run again: {why}")

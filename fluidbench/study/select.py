@@ -26,11 +26,13 @@ from ..run import Job
 from ..scenario import Scenario
 from ..store import Store
 from ..target import Target
+from ..verdict import lacking
 from .compare import lengths_of
 from .execute import Finished, Hooks, execute
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
 ENOUGH = 3  # spacings needed for an extrapolation
+FALLS = 0.5  # observed order from which an error counts as falling
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,25 @@ class Selection:
     limits: dict[str, dict[str, float]]
     runs: list[Finished]
     notes: list[str] = field(default_factory=list)
+
+    def missing(self) -> list[str]:
+        """Runs that it wanted and has nothing of; that a method refuses is an answer."""
+        return lacking(self.runs, refusals=False)
+
+    def order(self, method: str) -> float:
+        """Least-squares slope of log error over log spacing of a method's candidates; NaN below ENOUGH of them."""
+        own = [c for c in self.candidates if c.method == method and c.discretisation > 0]
+        if len(own) < ENOUGH:
+            return math.nan
+        return float(np.polyfit(np.log([c.spacing for c in own]), np.log([c.discretisation for c in own]), 1)[0])
+
+    def converges(self, method: str) -> bool:
+        """Whether a method's error falls as it is refined: in all, and at the finest spacing once more."""
+        own = sorted((c for c in self.candidates if c.method == method), key=lambda c: c.spacing)
+        if len(own) < ENOUGH:
+            return False
+        falling = own[0].discretisation <= own[1].discretisation * (1.0 + 1e-9)
+        return falling and (own[0].discretisation == 0 or self.order(method) > FALLS)
 
     def front(self) -> list[Candidate]:
         """The candidates that none beats in both cost and error, cheapest first."""
@@ -156,10 +177,23 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Finished])
     consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
     if not trusted:
         result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
+    if len(trusted) == 1:
+        result.notes.append(
+            f"the consensus is {trusted[0]}'s own limit: it has no second witness, and its bias is not known"
+        )
     for run in runs:
         if run.ok and run.record["method"] in fits:
             result.candidates.append(_candidate(run, fits[run.record["method"]], consensus))
+    result.notes += [_unconverged(result, method) for method in fits if not result.converges(method)]
     return result
+
+
+def _unconverged(result: Selection, method: str) -> str:
+    """That a method's error does not fall, with the errors."""
+    own = sorted((c for c in result.candidates if c.method == method), key=lambda c: -c.spacing)
+    errors = ", ".join(f"{100 * c.discretisation:.1f}" for c in own)
+    spacings = ", ".join(f"{1e3 * c.spacing:.3g}" for c in own)
+    return f"{method}: not converged: its error does not fall with the spacing ({errors} % at {spacings} mm)"
 
 
 @dataclass(frozen=True)
@@ -217,15 +251,18 @@ def _candidate(run: Finished, fits: dict[str, Fit], consensus: dict[str, float])
 
 
 def confidence(result: Selection, tolerance: float) -> str:
-    """How sure the estimate is: high when two or more trusted methods agree within the tolerance, medium when they do
-    not or when one is trusted, otherwise low."""
+    """How sure the estimate is: high when two or more trusted methods converge and agree within the tolerance, medium
+    when they converge but do not agree, otherwise low: a limit that is not converged, or that nobody else confirms, may
+    be anything."""
     trusted = [m for m in result.limits if result.trust[m].trusted]
-    if len(trusted) >= 2:
-        keys = set.intersection(*(set(result.limits[m]) for m in trusted))
-        spread = [np.ptp(v) / abs(np.mean(v)) for k in keys if (v := [result.limits[m][k] for m in trusted])]
-        widest = float(max(spread, default=0.0))
-        word = "high" if widest <= tolerance else "medium"
-        return f"{word}: the limits of {' and '.join(trusted)} differ by at most {widest:.1%}"
-    if trusted:
-        return f"medium: only {trusted[0]} passes most known answers of this physics"
-    return "low: no method passes most known answers of this physics"
+    if not trusted:
+        return "low: no method passes most known answers of this physics"
+    if len(trusted) == 1:
+        return f"low: only {trusted[0]} passes most known answers of this physics, and nothing else confirms its limit"
+    keys = set.intersection(*(set(result.limits[m]) for m in trusted))
+    spread = [np.ptp(v) / abs(np.mean(v)) for k in keys if (v := [result.limits[m][k] for m in trusted])]
+    widest = float(max(spread, default=math.inf))
+    words = f"the limits of {' and '.join(trusted)} differ by at most {widest:.1%}"
+    if loose := [m for m in trusted if not result.converges(m)]:
+        return f"low: {words}, but {' and '.join(loose)} is not converged"
+    return f"{'high' if widest <= tolerance else 'medium'}: {words}"

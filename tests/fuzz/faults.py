@@ -25,7 +25,7 @@ TINY = (
 )  # fmt: skip
 RESULTS = ("record.json", "series.parquet", "final.npz")  # without them a run is not finished
 BESIDE = ("job.json", "log.txt")
-PAGES = ("compare.parquet", "compare.csv", "report.html", "views.png")
+PAGES = ("run-mpm.parquet", "run-mpm.csv", "run-mpm.html", "run-mpm-views.png")
 SHAPES = (
     "[]", "5", "{}", "null", '"completed"', "NaN", '{"verdict": "completed"}', '{"verdict": 5}',
     '{"verdict": ["completed"]}',
@@ -100,7 +100,7 @@ class Child:
         said, self.returncode, self.pid = io.StringIO(), 0, os.getpid()
         try:
             with patch.object(run, "_end_with_parent", lambda: None), contextlib.redirect_stdout(said):
-                run.main(Path(command[-1]))
+                run.main([command[-2]])
         except SystemExit as end:
             self.returncode = end.code if isinstance(end.code, int) else int(end.code is not None)
         except Exception:
@@ -232,9 +232,9 @@ def unwhole(out: Path) -> list[str]:
     check("record.json", record, folders[0])
     check("series.parquet", lambda path: len(pd.read_parquet(path)), folders[0])
     check("final.npz", snapshot, folders[0])
-    check("compare.parquet", lambda path: len(pd.read_parquet(path)), out)
-    check("compare.csv", lambda path: len(pd.read_csv(path)), out)
-    check("report.html", lambda path: "</html>" in path.read_text(), out)
+    check("run-mpm.parquet", lambda path: len(pd.read_parquet(path)), out)
+    check("run-mpm.csv", lambda path: len(pd.read_csv(path)), out)
+    check("run-mpm.html", lambda path: "</html>" in path.read_text(), out)
     return wrong
 
 

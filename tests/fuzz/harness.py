@@ -27,7 +27,8 @@ STUBS = {
     "fluidbench.study.execute": ("execute",),
     "fluidbench.study.experiments": ("run_tasks",),
     "fluidbench.study.validate": ("run",),
-    "fluidbench.run": ("launch", "perform"),
+    "fluidbench.run": ("launch",),
+    "fluidbench.child": ("perform",),
 }
 """What runs simulations: the entrances of the studies, and the child behind them."""
 

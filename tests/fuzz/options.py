@@ -23,6 +23,7 @@ HAS = {
     "--wall-limit": tuple(v for v in STUDIES if v != "stability"), "--render-every": ("compare", "run"),
     "--repeats": ("compare", "table1", "table2"), "--jobs": ("validate", "stability", "ablate", "table1"),
     "--tolerance": ("ablate", "select"), "--budget": ("select",), "--colour": ("render",), "--solver": ("run",),
+    "--checkpoint-every": ("compare", "run"),
     "--set": ("compare", "run", "stability", "ablate", "select", "table1", "show"),
 }  # fmt: skip
 """Option with a value -> verbs; a test holds it against the application."""
@@ -60,7 +61,8 @@ REALS = (
 )
 WHOLES = ("0", "-1", "1.5", "nan", "inf", "1e300", "text", "", "true", "9" * 30, "9" * 5000, "-" + "9" * 30)
 VALUES = {
-    "--wall-limit": REALS, "--render-every": (*REALS, "0", "1e-12"), "--spacing": (*REALS, "0", "1e-12"),
+    "--wall-limit": REALS, "--checkpoint-every": REALS, "--render-every": (*REALS, "0", "1e-12"),
+    "--spacing": (*REALS, "0", "1e-12"),
     "--repeats": WHOLES, "--threads": WHOLES, "--jobs": WHOLES,
     "--tolerance": ("5", "1.5", "nan", "inf", "-1", "0", "0%", "-5%", "nan%", "inf%", "much", "", "%", "5%%",
                     "1e300", "1e300%",
@@ -126,7 +128,6 @@ def verbs(rng: random.Random) -> Iterator[Case]:
     yield Case(sort, ("nosuchverb",), names=("nosuchverb",))
     yield Case(sort, ("--nosuch",), names=("--nosuch",))
     yield Case(sort, ("x" * 5000,))
-    yield Case(sort, (), EITHER)
     for verb in BARE:
         yield Case(sort, command(verb, "--no-such-option"), names=("--no-such-option",))
         yield Case(sort, command(verb, "--no-such-option=nan"), names=("--no-such-option",))

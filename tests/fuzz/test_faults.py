@@ -218,10 +218,10 @@ def test_a_broken_result_of_an_experiment_is_measured_again(junk, tmp_path, monk
     from fluidbench.study import experiments
 
     def one_by_one(tasks, function, workers):
-        return [(i, function(task)) for i, task in enumerate(tasks)]
+        return [(i, function(task)) for i, task in tasks.items()]
 
     monkeypatch.setattr(experiments, "_round", one_by_one)  # no processes
-    store, tasks = Store(tmp_path), [("point", {"x": 2})]
+    store, tasks = Store(tmp_path), [("point", {"x": 2, "method": "mpm", "target": {"backend": "warp"}})]
     double = lambda task: {"twice": 2 * task["x"]}  # noqa: E731
     assert experiments.run_tasks(tasks, double, store, 1, lambda *_: None) == [{"twice": 4}]
     path = next(tmp_path.rglob("result.json"))

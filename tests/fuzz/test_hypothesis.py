@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fluidbench.cli.app import budget_of, count_of, fraction, split, targets_of
+from fluidbench.cli.app import budget_of, count_of, fraction, names_in, targets_of
 from fluidbench.errors import UserError
 from fluidbench.library import assign, load, parse_override, validate
 from fluidbench.scenario import Scenario
@@ -128,8 +128,8 @@ def test_any_text_of_set_is_an_override_or_a_user_error(text):
 @MANY
 @given(WORDS)
 def test_any_text_of_an_option_is_a_value_or_a_user_error(text):
-    for read in (fraction, budget_of, lambda t: count_of(t, "--pools"), lambda t: choose(split(t)),
-                 lambda t: select(split(t)), lambda t: targets_of("cpu", t, 1)):  # fmt: skip
+    for read in (fraction, budget_of, lambda t: count_of(t, "--pools"), lambda t: choose(names_in(t, "--axis", "axis")),
+                 lambda t: select(names_in(t, "CASES", "case")), lambda t: targets_of("cpu", t, 1)):  # fmt: skip
         try:
             made = read(text)
         except UserError as error:
