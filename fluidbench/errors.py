@@ -14,8 +14,9 @@ class Obstacle(Exception):
     """Something outside the program stopped it, such as a full disk; one line, exit code 1. What was finished stays."""
 
 
-class Interrupted(KeyboardInterrupt):
-    """The user, or the system, wants it to stop; the message says what is finished."""
+class Interrupted(BaseException):
+    """The user, or the system, wants it to stop; the message says what is finished. No KeyboardInterrupt, which the
+    parser of the command line would swallow."""
 
 
 def quoted(value: object) -> str:

@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .errors import Obstacle, UserError
+from .errors import Interrupted, Obstacle, UserError
 from .offspring import command, environment
 from .store import key_of, make_way, write_atomically, write_record
 from .target import HERE, Target
@@ -25,6 +25,7 @@ PROGRESS, OBSTACLE = "@progress ", "@obstacle "
 ATTENDED = "--attended"  # to a child: end when standard input closes, which then is the parent's end
 GRACE = 120.0  # seconds beyond the wall limit for compiling, measuring and writing
 CHECKPOINTS = 300.0  # wall seconds between checkpoints
+_children: set[subprocess.Popen] = set()  # that run now, on whatever thread
 OOM_COUNTERS = (Path("/sys/fs/cgroup/memory.events"), Path("/sys/fs/cgroup/memory/memory.oom_control"))
 
 
@@ -76,6 +77,13 @@ def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | 
     return record if record is not None and code == 0 else _post_mortem(job, folder, code, timed, _oom_kills() > kills)
 
 
+def stop_children() -> None:
+    """Kill every child that runs now: whoever waits for one learns that it was interrupted."""
+    for child in list(_children):
+        _children.discard(child)
+        child.kill()
+
+
 def _clear(folder: Path) -> None:
     """Remove what an earlier run has left where results will be; raises Obstacle where that cannot be."""
     for path in (folder / name for name in ("record.json", "series.parquet", "final.npz", "log.txt")):
@@ -106,6 +114,7 @@ def _attend(
             timed.set()
             child.kill()
 
+        _children.add(child)
         killer = threading.Timer(limit, stop) if limit is not None else None
         if killer is not None:
             killer.start()
@@ -120,11 +129,14 @@ def _attend(
                 else:
                     log.write(line)
             child.wait()
+            if child not in _children:
+                raise Interrupted
         except BaseException:
             child.kill()
             child.wait()
             raise
         finally:
+            _children.discard(child)
             if killer is not None:
                 killer.cancel()
     return child.returncode, timed.is_set(), obstacle

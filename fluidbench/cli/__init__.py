@@ -18,17 +18,18 @@ MOST_LINES = 6
 
 def main() -> None:
     """Entry point: a user's mistake is a line and exit code 2, an obstacle a line and 1; what was cut off resumes."""
-    if hasattr(signal, "SIGTERM"):
-        signal.signal(signal.SIGTERM, _terminated)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stop)
     try:
         sys.exit(app(standalone_mode=False) or 0)
     except UserError as error:
         _leave(2, *str(error).splitlines()[:MOST_LINES])
     except Obstacle as error:
         _leave(1, f"{error}; what is finished stays, the same command resumes")
-    except KeyboardInterrupt as error:
-        finished = f": {error}" if isinstance(error, Interrupted) else ""
-        _leave(130, f"interrupted{finished}; the same command resumes with what is not")
+    except (KeyboardInterrupt, Interrupted) as error:
+        _leave(
+            130, f"interrupted: {str(error) or 'nothing is lost'}; the same command resumes with what is not finished"
+        )
     except BrokenPipeError:  # whoever read our output has gone
         sys.stderr.close()
         sys.exit(1)
@@ -41,8 +42,8 @@ def main() -> None:
         _misused(error)
 
 
-def _terminated(*_: object) -> NoReturn:
-    raise KeyboardInterrupt
+def _stop(*_: object) -> NoReturn:
+    raise Interrupted
 
 
 def _misused(error: Exception) -> NoReturn:

@@ -105,8 +105,8 @@ def _slump(scenario: Scenario, final: dict[str, float]) -> Answer:
         raise DoesNotApply(f"{what}: it is of H / R = 2 on a floor that sticks")
     tau = scenario.material.yield_stress / (scenario.material.density * g * height)
     data = table("viscoplastic_slump_crosscheck")
-    low, high = data["tau_prime"].min(), data["tau_prime"].max()
-    if tau < float(low) or tau > float(high):
+    low, high = (float(value) for value in data["tau_prime"].to_numpy()[[0, -1]])
+    if not low <= tau <= high:
         raise DoesNotApply(f"{what}: tau' = {tau:.3g} lies outside the table, {low:g} .. {high:g}")
     expected = float(np.interp(tau, data["tau_prime"], data[["slump_vof", "slump_mpm_extrap"]].mean(axis=1)))
     off = abs(final["slump"] - expected)

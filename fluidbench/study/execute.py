@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import Interrupted
 from ..needs import shortage
 from ..provenance import HARDWARE, code, hardware
-from ..run import Job, launch
+from ..run import Job, launch, stop_children
 from ..scenario import Scenario
 from ..solver import configure, get_solver, refusal
 from ..store import Store, claimed, write_record
@@ -101,8 +101,9 @@ def execute(planned: Sequence[Job], store: Store, hooks: Hooks, workers: int = 1
                 return list(pool.map(one, range(len(planned))))
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
+                stop_children()
                 raise
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Interrupted):
         raise Interrupted(f"{len(done)} of {len(planned)} runs are finished") from None
 
 

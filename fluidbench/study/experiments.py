@@ -50,7 +50,7 @@ def run_tasks(
                 write_record(folders[i], kept, name=RESULT)
                 store.made.add(folders[i])
             done(i, result)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Interrupted):
         finished = sum(result is not None for result in results)
         raise Interrupted(f"{finished} of {len(tasks)} experiments are finished") from None
     return [result or {CRASH: "it was not run"} for result in results]
@@ -97,6 +97,8 @@ def _round(
                     yield futures[future], {CRASH: f"{type(error).__name__}: {error}"}
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.kill()
             raise
 
 
