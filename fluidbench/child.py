@@ -64,7 +64,6 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     compared, not_compared = answers(scenario, series, final) if complete else ([], [])
     criteria = success(scenario, final, series) if complete and is_tower(scenario) else []
     record = job.heading() | {
-        "seed": scenario.seed, "spacing_m": scenario.spacing,
         "verdict": str(outcome.verdict), "reason": outcome.reason,
         "measures": final,
         "answers": [asdict(a) for a in compared], "not_compared": not_compared,

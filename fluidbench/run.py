@@ -58,7 +58,7 @@ class Job:
         """How every record of this job begins, whatever became of it."""
         return {
             "scenario": self.scenario["name"], "method": self.method, **asdict(self.target), "repeat": self.repeat,
-            "key": self.key,
+            "key": self.key, "seed": self.scenario["seed"], "spacing_m": self.scenario["spacing"],
         }  # fmt: skip
 
 
