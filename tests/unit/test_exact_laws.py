@@ -1,0 +1,173 @@
+"""The laws of matter against values worked out by hand and against their formulas in matrix form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from solvers import smoothing
+from solvers.constitutive import flow_stress, pressure, relieved, strain_and_flow
+from solvers.pbd import laws
+
+exact = lambda value: pytest.approx(value, rel=1e-12)  # noqa: E731
+
+
+@pytest.mark.parametrize(
+    ("compression", "bulk", "tait", "limit", "expected"),
+    [
+        (0.2, 1e3, 0.0, 1e30, 200.0),
+        (-0.05, 100.0, 0.0, 10.0, -5.0),
+        (-0.5, 100.0, 0.0, 10.0, -10.0),
+        (-0.5, 100.0, 0.0, 0.0, 0.0),
+        (0.5, 14.0, 1.0, 0.0, 2.0 * (1.5**7 - 1.0)),
+        (2.0, 7.0, 1.0, 0.0, 3.0**7 - 1.0),
+        (-0.5, 7.0, 1.0, 1e30, 0.5**7 - 1.0),
+    ],
+)
+def test_pressure(compression, bulk, tait, limit, expected):
+    assert pressure(compression, bulk, tait, limit) == exact(expected)
+
+
+@pytest.mark.parametrize(
+    ("trial", "threshold", "consistency", "index", "stiffness", "expected"),
+    [
+        (90.0, 100.0, 3.0, 1.0, 2.0, 90.0),  # below the threshold nothing flows
+        (100.0, 100.0, 3.0, 0.5, 2.0, 100.0),
+        (300.0, 100.0, 3.0, 1.0, 2.0, 220.0),  # 100 + 200 * 3 / (3 + 2)
+        (300.0, 100.0, 0.0, 0.5, 2.0, 100.0),  # perfectly plastic whatever the exponent
+        (40.0, 10.0, 4.0, 0.5, 2.0, 22.0),  # r = 9: 10 + 4 * 3, and 40 - 2 * 9
+        (32.0, 10.0, 3.0, 2.0, 5.0, 22.0),  # r = 2: 10 + 3 * 4, and 32 - 5 * 2
+        (1041.0, 1.0, 2.0, 2.0, 84.0, 201.0),  # r = 10: 1 + 2 * 100, and 1041 - 84 * 10
+    ],
+)
+def test_flow_stress(trial, threshold, consistency, index, stiffness, expected):
+    assert flow_stress(trial, threshold, consistency, index, stiffness) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("index", [0.2, 0.5, 0.9, 1.3, 3.0])
+@pytest.mark.parametrize("rate", [1e-4, 1e-2, 1.0, 50.0])
+@pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e3])
+def test_flow_stress_meets_its_equation_over_seven_decades(index, rate, stiffness):
+    """tau = 5 + 2 r^n where the trial is tau + S r; eight steps of Newton leave 1e-4 of what flows at most."""
+    tau = 5.0 + 2.0 * rate**index
+    trial = tau + stiffness * rate
+    assert flow_stress(trial, 5.0, 2.0, index, stiffness) == pytest.approx(tau, abs=1e-4 * (trial - 5.0))
+
+
+def matrix(values):
+    xx, yy, zz, xy, xz, yz = values
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def components(b):
+    return b[0, 0], b[1, 1], b[2, 2], b[0, 1], b[0, 2], b[1, 2]
+
+
+def dev(a):
+    return a - np.trace(a) / 3.0 * np.eye(3)
+
+
+def after_step(l, b, shear, threshold, consistency, relaxation, dt):
+    """The docstring's formulas in matrices, for index = 1."""
+    a = np.eye(3) + dt * dev(l)
+    b = a @ b @ a.T
+    mean, s = np.trace(b) / 3.0, dev(b)
+    trial, keep = shear * math.sqrt(0.5 * (s * s).sum()), 1.0
+    if trial > threshold:
+        stiffness = shear * dt * mean
+        keep = (threshold + (trial - threshold) * consistency / (consistency + stiffness)) / trial
+    b = mean * np.eye(3) + keep * s
+    if relaxation > 0:
+        return np.eye(3) + (b - np.eye(3)) * math.exp(-relaxation * dt)
+    return b * 3.0 / (2.0 + max(np.linalg.det(b), 0.0))
+
+
+L = np.array([[3.0, -7.0, 2.0], [5.0, 1.0, -4.0], [-6.0, 8.0, 2.5]])
+B = matrix([1.3, 0.9, 1.1, 0.2, -0.15, 0.25])
+
+
+@pytest.mark.parametrize("threshold", [1e30, 30.0, 0.0])
+@pytest.mark.parametrize("consistency", [0.0, 4.0])
+@pytest.mark.parametrize("relaxation", [0.0, 6.0])
+def test_strain_and_flow_is_its_matrix_form(threshold, consistency, relaxation):
+    got = strain_and_flow(*L.ravel(), *components(B), 200.0, threshold, consistency, 1.0, relaxation, 0.03)
+    assert got == exact(components(after_step(L, B, 200.0, threshold, consistency, relaxation, 0.03)))
+
+
+def test_strain_and_flow_hands_the_exponent_and_the_stiffness_to_the_flow_law():
+    """r from tau_y + k r^n + G dt m r = trial, read back from the deviator that is left."""
+    shear, threshold, consistency, index, dt = 200.0, 10.0, 3.0, 2.0, 0.03
+    got = matrix(strain_and_flow(*L.ravel(), *components(B), shear, threshold, consistency, index, 1e-12, dt))
+    a = np.eye(3) + dt * dev(L)
+    trial = a @ B @ a.T
+    before, after = (shear * math.sqrt(0.5 * (dev(t) ** 2).sum()) for t in (trial, got))
+    rate = (before - after) / (shear * dt * np.trace(trial) / 3.0)
+    assert after == pytest.approx(threshold + consistency * rate**index, rel=1e-9)
+
+
+def test_a_tensor_of_negative_determinant_is_scaled_by_three_halves():
+    b = np.diag([1.0, 1.2, -0.5])
+    got = strain_and_flow(*np.zeros(9), *components(b), 1.0, 1e30, 0.0, 1.0, 0.0, 0.01)
+    assert got == exact(components(1.5 * b))
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.5, 1.0])
+def test_relieved_has_the_mean_that_makes_the_determinant_one(ratio):
+    b = B / np.cbrt(np.linalg.det(B))
+    s = ratio * dev(b)
+    roots = np.roots([1.0, 0.0, -0.5 * (s * s).sum(), np.linalg.det(s) - 1.0])
+    mean = max(root.real for root in roots if abs(root.imag) < 1e-9)
+    assert relieved(*components(b), ratio) == exact(components(mean * np.eye(3) + s))
+
+
+@pytest.mark.parametrize("h", [0.5, 2.0])
+def test_wendland_by_hand(h):
+    peak = 21.0 / (16.0 * math.pi * h**3)
+    expected = {0.0: 1.0, 1.0: 0.5**4 * 3.0, 1.5: 0.25**4 * 4.0, 2.0: 0.0, 3.0: 0.0}
+    for q, share in expected.items():
+        assert smoothing.wendland(q, h) == exact(peak * share)
+    slope = -105.0 / (16.0 * math.pi * h**5)
+    for q, share in {0.0: 1.0, 1.0: 0.125, 1.5: 0.25**3, 2.0: 0.0, 3.0: 0.0}.items():
+        assert smoothing.wendland_slope(q, h) == exact(slope * share)
+
+
+@pytest.mark.parametrize("support", [0.5, 2.0])
+def test_poly6_and_spiky_by_hand(support):
+    for share in (0.0, 0.5, 1.0, 1.1):
+        r, left = share * support, max(1.0 - share, 0.0)
+        assert smoothing.poly6(r * r, support) == exact(
+            315.0 / (64.0 * math.pi * support**3) * max(1.0 - share * share, 0.0) ** 3
+        )
+        assert smoothing.spiky(r, support) == exact(15.0 / (math.pi * support**3) * left**3)
+        assert smoothing.spiky_slope(r, support) == exact(-45.0 / (math.pi * support**4) * left**2)
+
+
+def test_the_spline_by_hand():
+    assert smoothing.quadratic_spline(0.5) == exact((0.5, 0.5, 0.0))
+    assert smoothing.quadratic_spline(1.0) == exact((0.125, 0.75, 0.125))
+    assert smoothing.quadratic_spline(1.25) == exact((0.03125, 0.6875, 0.28125))
+
+
+def test_what_position_based_sweeps_can_stand_for():
+    """rho n H^2 / (22 dt) = 1100 * 8 * 0.02^2 / (22 * 1e-3) = 160; kappa rho (d / dt)^2 = 0.5 * 1000 * 10^2."""
+    assert laws.largest_viscosity(1100.0, 1e-3, 0.02, 8.0) == exact(160.0)
+    assert laws.smoothing_weight(40.0, 1100.0, 1e-3, 0.02, 8.0) == exact(0.25)
+    assert laws.smoothing_weight(160.0, 1100.0, 1e-3, 0.02, 8.0) == exact(1.0)
+    assert laws.smoothing_weight(500.0, 1100.0, 1e-3, 0.02, 8.0) == 1.0
+    assert laws.largest_modulus(0.5, 1000.0, 0.01, 1e-3) == exact(5e4)
+    assert laws.conveyed_modulus(5e4, 0.5, 1000.0, 0.01, 1e-3) == exact(2.5e4)
+    assert laws.conveyed_modulus(2e4, 0.5, 1000.0, 0.01, 1e-3) == exact(1.0 / (1.0 / 2e4 + 1.0 / 5e4))
+
+
+@pytest.mark.parametrize(
+    ("ratio", "share"),
+    [
+        (0.8, 1.0), (1.0, 1.0), (1.2, 1.0 - 0.5 * 0.2 / (math.sqrt(2) - 1)), (math.sqrt(2), 0.5),
+        (1.6, 0.1875 + 0.3125 * (math.sqrt(3) - 1.6) / (math.sqrt(3) - math.sqrt(2))), (math.sqrt(3), 0.1875),
+        (1.8, 0.1875 - 0.3125 * (1.8 - math.sqrt(3)) / (math.sqrt(3) - math.sqrt(2))), (2.5, 0.05),
+    ],
+)  # fmt: skip
+def test_bonds_soften_linearly_with_their_length(ratio, share):
+    """k = 8 E d / 15 times 1, 1/2, 3/16 at 1, sqrt 2, sqrt 3 spacings, linear in between, never below 1/20."""
+    spacing = 0.01
+    assert laws.bond_stiffness(3e4, spacing, ratio * spacing) == pytest.approx(160.0 * share, rel=1e-6)
