@@ -120,7 +120,7 @@ def test_the_plan_takes_the_fewest_substeps_that_the_smallest_bound_allows(limit
 
 @pytest.mark.parametrize(("dt", "tick"), [(0.0, 1.0), (-1.0, 1.0), (math.nan, 1.0), (1.0, math.inf), (1.0, math.nan)])
 def test_what_allows_no_step_is_refused(dt, tick):
-    with pytest.raises(ValueError, match="bound 'a' is .* which allows no step"):
+    with pytest.raises(ValueError, match=r"bound 'a' is .* which allows no step"):
         plan([Bound("a", dt, "", "")], tick)
 
 
