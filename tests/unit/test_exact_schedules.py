@@ -130,7 +130,7 @@ def test_spawning_multiplies_at_each_pass():
 
 
 def test_speeds_of_expansion():
-    """Growth is fastest at its onset, R' / 3 = (ratio - 1) / (3 time); spawning makes room for R^(1/3) in an interval."""
+    """Growth is fastest at its onset, R' / 3 = (ratio - 1) / (3 time); spawning makes room in one interval."""
     assert Expansion(ratio=9.0, time=2.0).speed(0.3) == pytest.approx(0.3 * 8.0 / (3 * 2.0))
     spawn = Expansion(kind="spawn", ratio=64.0, passes=2, interval=0.5, impulse=0.7, noise=0.2)
     assert spawn.speed(0.3) == pytest.approx(0.7 + 0.2 + 0.3 * (4.0 - 2.0) / 0.5)
