@@ -1,0 +1,187 @@
+"""Beads, layers, slump and spread of deposits whose size is known to the cell, and what they are averaged over."""
+
+import numpy as np
+import pytest
+
+from fluidbench.measure.bead import Bead, layer_heights, measure_bead
+from fluidbench.measure.deposit import Deposit
+from fluidbench.measure.slump import front, measure_slump, radial_heights, spread_radius
+
+from ..conftest import bead, scenario
+
+D = 0.002
+FLOOR = 0.1
+DOMAIN = {"lower": [-0.02, -0.04, FLOOR], "upper": [0.06, 0.04, FLOOR + 0.03]}
+LINE = {"kind": "line", "start": [0.0, 0.0], "end": [0.031, 0.0], "speed": 0.1}
+
+
+def paste(**more):
+    return bead(**{"domain": DOMAIN, "toolpath": LINE, **more})
+
+
+def block(x=(0, 40), y=(16, 24), z=(0, 5)):
+    """A block of full cells of edge D, numbered from the domain's lower corner; it is wide open to every side."""
+    fill = np.zeros((40, 40, 15))
+    fill[slice(*x), slice(*y), slice(*z)] = 1.0
+    return Deposit(np.array(DOMAIN["lower"]) + D / 2, D, fill)
+
+
+def test_a_block_under_the_path_has_its_width_height_and_area():
+    """8 cells wide and 5 high; the blur of the spline takes a few of 640 fine cells from the two upper edges."""
+    made = measure_bead(block(), paste())
+    assert made.width == pytest.approx(np.full(15, 8 * D)) and made.height == pytest.approx(np.full(15, 5 * D))
+    assert made.area == pytest.approx(np.full(15, 40 * D**2), rel=0.015)
+    assert made.station == pytest.approx(np.linspace(0.0, 0.031, 15))
+    assert made.middle.width == pytest.approx(8 * D) and made.middle.area == made.area[7]
+    summary = made.summary(1)
+    assert summary["bead_width_m"] == pytest.approx(8 * D) and summary["bead_height_m"] == pytest.approx(5 * D)
+    assert summary["bead_area_m2"] == pytest.approx(made.area[7]) and summary["bead_continuity"] == 1.0
+    assert made.summary(4)["bead_area_m2"] == pytest.approx(made.area[7] / 4)
+
+
+def test_sections_stand_square_to_the_leg_they_lie_on():
+    """A strip along x: cut across by the first leg, lengthwise by the second, to the reach of 2.5 diameters."""
+    path = {"kind": "polyline", "points": [[0.0, 0.0], [0.03, 0.0], [0.03, 0.02]], "speed": 0.1}
+    made = measure_bead(block(y=(16, 40)), paste(toolpath=path))
+    first = made.station < 0.03
+    assert len(made.station) == 25 and (~first).sum() == 10
+    assert made.width[first] == pytest.approx(np.full(15, 12.0 * D + 0.014), abs=D)  # from -0.008 to the reach of 0.03
+    assert made.width[~first] == pytest.approx(np.full(10, 0.06), abs=D / 3)
+
+
+@pytest.mark.parametrize(
+    ("more", "reach"),
+    [
+        ({}, 0.03),
+        ({"material": {"density": 100.0, "expansion": {"ratio": 8.0}}}, 0.06),
+        ({"toolpath": {"kind": "ring", "center": [0.02, 0.0], "radius": 0.015, "speed": 0.1}}, 0.015),
+        ({"toolpath": {"kind": "ring", "center": [0.02, 0.0], "radius": 0.031, "speed": 0.1}}, 0.03),
+    ],
+)
+def test_sections_reach_two_and_a_half_diameters_and_no_ring_to_its_other_side(more, reach):
+    domain = {"lower": [-0.1, -0.1, FLOOR], "upper": [0.1, 0.1, FLOOR + 0.03]}
+    made = measure_bead(block(y=(0, 40)), paste(domain=domain, **more))
+    assert made.width == pytest.approx(np.full(len(made.width), 2 * reach), abs=D / 3)
+
+
+@pytest.mark.parametrize(("length", "count"), [(0.01, 12), (0.0251, 12), (0.0271, 13), (0.2, 100), (0.5, 160)])
+def test_there_is_a_section_a_spacing_within_limits(length, count):
+    domain = {"lower": [-0.02, -0.04, FLOOR], "upper": [0.6, 0.04, FLOOR + 0.03]}
+    made = measure_bead(block(), paste(domain=domain, toolpath={**LINE, "end": [length, 0.0]}))
+    assert len(made.station) == count and made.station[-1] == pytest.approx(length)
+
+
+def test_no_bead_without_a_moving_nozzle():
+    assert measure_bead(block(), scenario()) is None
+    fixed = {"kind": "line", "start": [0.0, 0.0], "speed": 0.0, "dwell": 1.0}
+    assert measure_bead(block(), paste(toolpath=fixed)) is None
+
+
+def by_hand(width, area):
+    station = np.linspace(0.0, 2.0, 11)  # the middle is 0.4 .. 1.6: sections 2 to 8
+    return Bead(station, np.array(width, float), 10.0 * np.array(width, float), np.array(area, float), middle=None)
+
+
+def test_averages_run_over_the_middle_three_fifths():
+    made = by_hand([100, 100, 1, 2, 3, 4, 5, 6, 7, 100, 100], [50, 50, 2, 2, 2, 2, 2, 2, 9, 50, 50])
+    summary = made.summary(3)
+    assert summary["bead_width_m"] == pytest.approx(4.0) and summary["bead_height_m"] == pytest.approx(40.0)
+    assert summary["bead_area_m2"] == pytest.approx(3.0 / 3) and summary["bead_continuity"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("inner", "continuity"),
+    [
+        ([2, 2, 2, 2, 2, 2, 2], 1.0),
+        ([2, 2, 1.02, 2, 2, 2, 2], 1.0),
+        ([2, 2, 0.98, 2, 2, 2, 2], 6 / 7),
+        ([2, 2, 1.0, 2, 2, 2, 2], 6 / 7),
+        ([2, 0.08, 0.08, 2, 2, 0.0, 2], 4 / 7),
+        ([0, 0, 0, 0, 0, 0, 0], 0.0),
+        ([0, 0, 0, 0, 0, 0, 3], 1 / 7),
+        ([9, 9, 2, 2, 2, 0.98, 0.98], 5 / 7),  # the median, not the mean
+    ],
+)
+def test_continuity_is_the_share_of_sections_above_half_the_median(inner, continuity):
+    made = by_hand(np.ones(11), [0, 0, *inner, 0, 0])
+    assert made.summary(1)["bead_continuity"] == pytest.approx(continuity)
+
+
+def test_layers_rise_from_mean_to_mean_by_the_time_they_were_laid():
+    """Layers of 0.31 s with pauses of 0.2 s: 0 .. 0.31, 0.51 .. 0.82, 1.02 .. 1.33."""
+    path = {**LINE, "kind": "wall", "layers": 3, "layer_height": 0.005, "pause": 0.2}
+    s = paste(toolpath=path, duration=1.4)
+    birth = np.array([0.1, 0.2, 0.31, 0.52, 0.82, 1.03, 1.33])
+    height = np.array([1.0, 2.0, 3.0, 7.0, 8.0, 10.0, 11.0])
+    position = np.stack([np.zeros(7), np.zeros(7), height], axis=1)
+    assert layer_heights(position, birth, s) == pytest.approx([5.5, 3.0])
+    middle_missing = np.array([0, 1, 2, 5, 6])
+    assert layer_heights(position[middle_missing], birth[middle_missing], s) == pytest.approx([8.5])
+    assert layer_heights(position, birth, paste()) == [] == layer_heights(position, birth, scenario())
+    two = paste(toolpath={**path, "layers": 2}, duration=1.4)
+    assert layer_heights(position, np.minimum(birth, 0.8), two) == pytest.approx([7.0])
+
+
+def heap(heights, origin=(0.01, 0.01, 0.01), spacing=0.01, cells=8):
+    """A deposit whose columns are this high, in cells."""
+    heights = np.array(heights, float)[..., None]
+    return Deposit(np.array(origin), spacing, np.clip(heights - np.arange(cells), 0.0, 1.0))
+
+
+def test_heights_of_rings_about_an_axis():
+    """About the middle of 5 x 5 columns: 1 at the axis, 8 at one, 12 at two and 4 corners at three spacings."""
+    heights = np.zeros((5, 5))
+    heights[2, 2], heights[1:4, 2], heights[0, 0] = 5.0, [4.0, 5.0, 2.0], 8.0
+    radius, mean = radial_heights(heap(heights), 0.03, 0.03)
+    root = np.sqrt
+    expected = [0, (4 + 4 * root(2)) / 8, (4 * 2 + 8 * root(5)) / 12, 2 * root(2)]
+    assert radius == pytest.approx(0.01 * np.array(expected))
+    assert mean == pytest.approx(0.01 * np.array([5, 6 / 8, 0, 8 / 4]))
+    radius, _ = radial_heights(heap(heights[:1]), 0.04, 0.03)  # no column within the first rings
+    assert radius == pytest.approx(0.01 * np.array([(3 + 2 * root(10)) / 3, root(13)]))
+
+
+def test_the_front_lies_where_the_mean_height_falls_below_one_spacing():
+    """Means over y of 4, 3, 1.5, 0.5 and 0 cells: one spacing is midway between the third and the fourth."""
+    profile = np.array([4, 3, 1.5, 0.5, 0.0])
+    assert front(heap(np.stack([profile, profile], axis=1))) == pytest.approx(0.035)
+    assert front(heap(np.stack([profile + 0.25, profile - 0.25], axis=1).clip(0))) > 0.03
+    assert front(heap([[0.5], [0.2]])) == 0.01  # nowhere a spacing high: the first column
+    assert front(heap([[2.0], [1.0], [1.0]])) == pytest.approx(0.03)  # nowhere lower: the last
+    assert front(heap([[2.0], [0.5], [3.0], [0.0]])) == pytest.approx(0.03 + 0.01 * 2 / 3)  # the last fall counts
+    assert front(heap([[2.0], [1.0], [0.0]])) == pytest.approx(0.02)
+
+
+def test_the_spread_is_the_radius_of_that_fall():
+    heights = np.zeros((7, 7))
+    gx, gy = np.meshgrid(range(-3, 4), range(-3, 4))
+    heights[np.rint(np.hypot(gx, gy)) <= 2] = 3.0
+    inner, outer = (4 * 2 + 8 * 5**0.5) / 12, np.hypot(gx, gy)[np.rint(np.hypot(gx, gy)) == 3].mean()
+    expected = 0.01 * (inner + 2 / 3 * (outer - inner))
+    assert spread_radius(heap(heights), 0.04, 0.04) == pytest.approx(expected)
+
+
+def test_slump_and_spread_of_a_cylinder_are_counted_from_the_floor():
+    """It stood 0.08 m above a floor at 0.005 m; 5 columns within a quarter of its radius reach 6 cells, others 7."""
+    body = {"kind": "cylinder", "center": [0.08, 0.08, 0.045], "radius": 0.042, "height": 0.08}
+    domain = {"lower": [0, 0, 0.005], "upper": [0.2, 0.2, 0.2]}
+    heights = np.full((15, 15), 7.0)
+    heights[6:9, 7] = heights[7, 6:9] = 6.0
+    deposit = heap(heights)
+    got = measure_slump(deposit, scenario(bodies=[body], domain=domain))
+    assert got["slump"] == pytest.approx(1.0 - 0.06 / 0.08)
+    assert got["spread_radius_m"] == spread_radius(deposit, 0.08, 0.08) and len(got) == 2
+    wide = measure_slump(deposit, scenario(bodies=[{**body, "radius": 0.06}], domain=domain))
+    assert wide["slump"] == pytest.approx(1.0 - 0.07 / 0.08)
+
+
+def test_front_and_height_of_a_box_are_counted_from_the_walls():
+    body = {"kind": "box", "center": [0.04, 0.1, 0.02], "size": [0.04, 0.04, 0.04]}
+    domain = {"lower": [0.004, 0, 0.005], "upper": [0.2, 0.2, 0.2]}
+    deposit = heap([[4.0], [2.0], [0.0]])
+    got = measure_slump(deposit, scenario(bodies=[body], domain=domain))
+    assert got == pytest.approx({"front_x_m": 0.025 - 0.004, "height_m": 0.045 - 0.005})
+    later = {**body, "start": 0.004}
+    assert measure_slump(deposit, scenario(bodies=[body, later], domain=domain)) == {}
+    ball = {"kind": "sphere", "center": [0.1, 0.1, 0.1], "radius": 0.03}
+    assert measure_slump(deposit, scenario(bodies=[ball], domain=domain)) == {} == measure_slump(deposit, paste())
