@@ -21,7 +21,7 @@ def paste(**more):
 
 def block(x=(0, 40), y=(16, 24), z=(0, 5)):
     """A block of full cells of edge D, numbered from the domain's lower corner; it is wide open to every side."""
-    fill = np.zeros((40, 40, 15))
+    fill = np.zeros((40, 40, 8))
     fill[slice(*x), slice(*y), slice(*z)] = 1.0
     return Deposit(np.array(DOMAIN["lower"]) + D / 2, D, fill)
 
@@ -67,7 +67,8 @@ def test_sections_reach_two_and_a_half_diameters_and_no_ring_to_its_other_side(m
 @pytest.mark.parametrize(("length", "count"), [(0.01, 12), (0.0251, 12), (0.0271, 13), (0.2, 100), (0.5, 160)])
 def test_there_is_a_section_a_spacing_within_limits(length, count):
     domain = {"lower": [-0.02, -0.04, FLOOR], "upper": [0.6, 0.04, FLOOR + 0.03]}
-    made = measure_bead(block(), paste(domain=domain, toolpath={**LINE, "end": [length, 0.0]}))
+    thin = Deposit(np.array(DOMAIN["lower"]) + D / 2, D, np.ones((3, 3, 1)))
+    made = measure_bead(thin, paste(domain=domain, toolpath={**LINE, "end": [length, 0.0]}))
     assert len(made.station) == count and made.station[-1] == pytest.approx(length)
 
 
