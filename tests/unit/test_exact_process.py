@@ -67,7 +67,7 @@ def test_discs_leave_at_their_time_and_have_flown_since():
 
 
 def test_carried_discs_head_for_their_place_at_the_next_tick_wherever_they_lag():
-    """In 50 ms the nozzle has gone 4 mm in x and 1 mm in y: from 3 mm in x for a new disc, from 0 for one left behind."""
+    """After 50 ms the nozzle is at (4, 1) mm; a new disc starts from 3 mm in x, one that was left behind from 0."""
     path = {"kind": "polyline", "points": [[0, 0], [0.004, 0], [0.004, 0.012]], "speed": 0.1}
     pool, emission, stream = fed(1000.0, toolpath=path)
     n = len(stream.offsets)
