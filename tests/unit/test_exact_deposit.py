@@ -32,11 +32,14 @@ def test_a_particle_in_a_cells_middle_fills_27_cells_by_the_quadratic_spline():
                 expected = 0.7 / D**3 * math.prod(weights)
                 assert value(deposit, BOX, 4 + i, 5 + j, 6 + k) == pytest.approx(expected, abs=1e-12)
     assert deposit.volume() == pytest.approx(0.7) and deposit.spacing == D
+    for axis in range(3):  # the outermost cells are empty, since the field extends as they are
+        assert not deposit.fill.take([0, -1], axis=axis).any()
 
 
 def test_a_particle_off_the_middle_leans_to_the_nearer_cell():
-    """A quarter of a cell: (1.5 - 1.25)^2 / 2, 3/4 - 1/16, (1.25 - 0.5)^2 / 2 to either side."""
-    for shift, weights in ((0.25, (0.03125, 0.6875, 0.28125)), (-0.25, (0.28125, 0.6875, 0.03125))):
+    """A quarter of a cell: (1.5 - 1.25)^2 / 2, 3/4 - 1/16, (1.25 - 0.5)^2 / 2 to either side; and nearly half."""
+    quarter, half = (0.03125, 0.6875, 0.28125), (0.5 * 0.01**2, 0.75 - 0.49**2, 0.5 * 0.99**2)
+    for shift, weights in ((0.25, quarter), (-0.25, quarter[::-1]), (0.49, half), (-0.49, half[::-1])):
         deposit = spread([[-1.0 + (4.5 + shift) * D, 5.5 * D, 2.0 + 6.5 * D]], [D**3])
         assert [value(deposit, BOX, i, 5, 6) for i in (3, 4, 5)] == pytest.approx([w * 0.75**2 for w in weights])
 
@@ -63,6 +66,17 @@ def test_walls_mirror_what_would_lie_behind_them(axis, upper):
     low = deposit.origin - D / 2
     assert (low >= np.asarray(BOX.lower) - 1e-12).all()
     assert (low + D * np.array(deposit.fill.shape) <= np.asarray(BOX.upper) + 1e-12).all()
+
+
+@pytest.mark.parametrize("away", range(6))
+def test_the_field_never_reaches_beyond_the_walls(away):
+    """However many cells from them the only particle lies; rounding adds no cell to a box of seven."""
+    seven = Domain(lower=(0.1, 0.1, 0.1), upper=(0.8, 0.8, 0.8))
+    for cell in ([away] * 3, [6 - away] * 3):
+        deposit = spread([0.1 + 0.1 * (np.array(cell) + 0.5)], [1e-3], seven, 0.1)
+        low = (deposit.origin - 0.1) / 0.1 - 0.5
+        assert (low > -0.01).all() and (low + deposit.fill.shape < 7.01).all()
+        assert deposit.volume() == pytest.approx(1e-3)
 
 
 def test_a_full_box_is_full_to_its_walls():
@@ -107,6 +121,8 @@ def test_the_top_lies_where_half_of_the_space_is_filled():
     assert STEPS.top(2.0, 2.0, within=0.1) == 0.0
     assert STEPS.top(1.0, 2.0, within=0.5) == pytest.approx(3.0 + 2.5 * D)  # both neighbours at 0.5 are within
     assert STEPS.top(2.0, 2.0, within=0.5) == STEPS.top()
+    fine = Deposit(np.zeros(3), 0.04, np.array([[[1.0, 0.0]], [[1.0, 1.0]]]))
+    assert fine.top(0.0, 0.0) == pytest.approx(0.02) and fine.top(0.04, 0.0) == pytest.approx(0.06)
     assert STEPS.top(x=1.0) == STEPS.top(y=2.0, within=0.1) == STEPS.top()  # an axis needs both
 
 
