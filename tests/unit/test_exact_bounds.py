@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from fluidbench.solver import get_solver
 from fluidbench.timestep import Bound, damped_limit, lost_speed, plan
@@ -98,6 +99,31 @@ def test_formulas_name_the_numbers_that_were_used():
     assert made["sph acoustic"].startswith("0.4 h") and made["sph viscous"].startswith("0.09 h^2")
     assert made["sph force"].startswith("0.25 sqrt")
     assert made["pbd accuracy"] == "0.125 d / v" and made["pbd free fall"] == "sqrt(0.125 d / |g|)"
+
+
+@pytest.mark.parametrize(
+    ("method", "key", "accepted", "refused"),
+    [
+        ("mpm", "grid_ratio", (1.0, 4.0), (0.99, 4.01)),
+        ("mpm", "safety", (0.01, 1.0), (0.0, 1.01)),
+        ("mpm", "advection", (0.01, 0.99), (0.0, 1.0)),
+        ("sph", "smoothing_ratio", (1.0, 3.0), (0.99, 3.01)),
+        ("sph", "smoothing_ratio_solid", (1.0, 3.0), (0.99, 3.01)),
+        ("sph", "cfl", (0.01, 1.5), (0.0, 1.51)),  # 1.73 is unstable
+        ("sph", "viscous_number", (0.01, 0.11), (0.0, 0.111)),  # 0.111 is unstable
+        ("sph", "force_number", (0.01, 1.0), (0.0, 1.01)),
+        ("sph", "artificial_viscosity", (0.0, 9.0), (-0.01,)),
+        ("pbd", "support_ratio", (2.0, 4.0), (1.99, 4.01)),
+        ("pbd", "advance", (0.01, 1.0), (0.0, 1.01)),
+    ],
+)
+def test_settings_that_no_bound_could_answer_for_are_refused(method, key, accepted, refused):
+    settings = get_solver(method).Config
+    for value in accepted:
+        assert getattr(settings(**{key: value}), key) == value
+    for value in refused:
+        with pytest.raises(ValidationError, match=key):
+            settings(**{key: value})
 
 
 @pytest.mark.parametrize(

@@ -61,11 +61,11 @@ def test_the_widest_section_as_a_circle():
 
 
 def test_upward_passages_through_the_mean():
-    time = np.array([0.0, 1.0, 3.0, 4.0, 5.0, 7.0, 8.0, 9.0])
+    time = np.array([0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 7.5, 9.0])
     signal = np.array([-1.0, 3.0, -3.0, 0.0, 1.0, -2.0, 4.0, -2.0])
     assert signal.mean() == 0.0
-    assert crossings(time, signal + 5.0) == pytest.approx([0.25, 4.0, 7.0 + 1 / 3])
-    assert period(time, signal) == pytest.approx((7.0 + 1 / 3 - 0.25) / 2)
+    assert crossings(time, signal + 5.0) == pytest.approx([0.5, 4.0, 7.0 + 1 / 6])
+    assert period(time, signal) == pytest.approx((7.0 + 1 / 6 - 0.5) / 2)
     assert np.isnan(period(np.arange(3.0), np.array([-1.0, 2.0, -1.0])))
     assert period(np.arange(5.0), np.array([-1.0, 1.0, -1.0, 1.0, 0.0])) == pytest.approx(2.0)
 
