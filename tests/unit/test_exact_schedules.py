@@ -60,6 +60,13 @@ def test_ages_of_steps():
     assert [stages.age_at(a) for a in (0.1, 0.25, 0.26, 0.5, 1.0)] == pytest.approx([1.5, 1.5, 2.0, 2.0, 3.0])
 
 
+def test_rounding_costs_no_step():
+    """1.4 - 1.1 is a little less than 0.3, 3 * 0.1 a little more, and 0.3 / 0.1 a little less than 3."""
+    stages = Cure(kind="stages", delay=1.1, time=1.0, stages=10, youngs_modulus=E)
+    assert stages.degree(1.4) == 0.3 and stages.age_at(3 * 0.1) == pytest.approx(1.4)
+    assert Expansion(kind="spawn", ratio=16.0, passes=4, interval=0.1).volume_ratio(0.3) == pytest.approx(16.0)
+
+
 def test_a_level_begins_where_it_becomes_the_nearest():
     """Steps begin at their own age; a continuous law is at level k from alpha = (k - 1/2) / 100 on."""
     assert cure("jump").level_ages().tolist() == [1.0]

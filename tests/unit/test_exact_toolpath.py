@@ -46,6 +46,7 @@ def test_velocity_changes_at_corners_and_is_zero_in_pauses_and_after_the_end(tim
 def test_fed_time_stands_still_in_pauses_and_release_time_inverts_it():
     times, fed = [0.5, 3.5, 4.0, 4.5, 5.0, 8.0, 9.0], [0.5, 3.5, 3.5, 3.5, 4.0, 7.0, 7.0]
     assert TRACK.extruded(np.array(times)).tolist() == fed and TRACK.extruded(-1.0) == 0.0
+    assert TRACK.release_time(7.0 + 1e-9) == pytest.approx(8.0)  # rounding may ask for a little more than there is
     assert TRACK.release_time(np.array([0.0, 0.5, 1.5, 3.5, 4.0, 7.0])) == pytest.approx([0.0, 0.5, 1.5, 3.5, 5.0, 8.0])
 
 
@@ -61,6 +62,13 @@ def test_the_nozzle_never_rises_faster_than_it_travels():
     assert Track.of(Toolpath(**wall, pause=0.3), 0.0, 0.1).time.tolist() == pytest.approx([0, 2, 2.3, 4.3])
 
 
+def test_every_second_layer_of_an_open_path_goes_back():
+    wall = {"kind": "wall", "start": (0, 0), "end": (1, 0), "speed": 0.5, "layers": 4, "layer_height": 0.1}
+    track = Track.of(Toolpath(**wall), 0.0, 0.1)
+    assert track.position[:, 0].tolist() == [0, 1, 1, 0, 0, 1, 1, 0]
+    assert track.release_time(np.array([1.0, 3.0, 5.0, 7.0])) == pytest.approx([1.0, 3.2, 5.4, 7.6])
+
+
 def test_a_fixed_nozzle_feeds_for_its_dwell_on_every_layer():
     path = Toolpath(
         kind="line", start=(1, 2), end=(5, 5), speed=0.0, dwell=3.0, layers=2, layer_height=0.1, pause=0.5
@@ -69,6 +77,9 @@ def test_a_fixed_nozzle_feeds_for_its_dwell_on_every_layer():
     assert track.time.tolist() == [0.0, 3.0, 3.5, 6.5] and track.extruding.tolist() == [0.0, 3.0, 3.0, 6.0]
     assert track.position[:, :2].tolist() == [[1, 2], [1, 2], [5, 5], [5, 5]]  # open paths go back and forth
     assert track.position[:, 2] == pytest.approx([0.2, 0.2, 0.3, 0.3])
+    assert track.layer_at(np.array([2.9, 3.4, 3.6, 6.4])).tolist() == [0, 0, 1, 1]
+    hasty = Toolpath(start=(1, 2), speed=0.0, dwell=3.0, layers=2, layer_height=0.1)
+    assert Track.of(hasty, 0.0, 0.2).time.tolist() == [0.0, 3.0, 3.0, 6.0]
     single = Track.of(Toolpath(start=(1, 2), speed=0.0, dwell=3.0), 0.0, 0.2)
     assert single.time.tolist() == [0.0, 3.0] and single.velocity(1.0).tolist() == [0, 0, 0]
     assert single.at(2.0).tolist() == [1, 2, 0.2] and single.layer.tolist() == [0]
