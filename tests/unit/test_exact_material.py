@@ -66,6 +66,8 @@ def test_material_at_a_degree_a_level_and_an_age():
     half = foam.at(0.5, 4.0)
     assert (half.density, half.youngs_modulus, half.viscosity) == pytest.approx((RHO / 4.0, 5e3, 6.0))
     assert [m.youngs_modulus for m in foam.levels()] == pytest.approx([1e3, 3e3, 5e3, 7e3, 9e3])
+    never = material(youngs_modulus=1e3, cure=Cure(yield_stress=50.0))  # fresh it does not yield: not at 0 Pa
+    assert [m.yield_stress for m in never.levels()] == [None, 50.0] and never.at(0.5).yield_stress == 25.0
     assert {m.density for m in foam.levels()} == {RHO} and len(material().levels()) == 1
     # Jitter counts as early: stages at 2.5, 3.5, ... and passes at 0.75, 1.75 s.
     aged = foam.by_age([0.7, 0.8, 1.7, 1.8, 2.4, 2.6, 5.4, 5.6])
@@ -142,7 +144,13 @@ def test_velocity_is_the_sum_of_its_parts():
 def test_top_speed_is_that_of_the_fastest_corner_plus_the_crest():
     assert Body(**BOX, velocity=(3, 4, 0)).top_speed == pytest.approx(5.0)
     assert Body(**BOX, angular_velocity=(0, 0, 2)).top_speed == pytest.approx(2 * math.hypot(1, 2))
+    assert Body(**BOX, angular_velocity=(2, 0, 0)).top_speed == pytest.approx(2 * math.hypot(2, 3))
+    assert Body(**BOX, angular_velocity=(0, 2, 0)).top_speed == pytest.approx(2 * math.hypot(1, 3))
     stretch = ((1.0, 0, 0), (0, 0, 0), (0, 0, 0))
+    for axis in range(3):  # backwards too, about whatever centre
+        back, grow = np.zeros(3), np.zeros((3, 3))
+        back[axis], grow[axis, axis] = -3.0, 1.0
+        assert Body(**BOX, velocity=back, velocity_gradient=grow).top_speed == pytest.approx(3.0 + [1, 2, 3][axis])
     assert Body(**BOX, velocity=(3, 4, 0), velocity_gradient=stretch).top_speed == pytest.approx(math.hypot(4, 4))
     wave = Wave(amplitude=(0.3, 0.4, 0.0), number=(1, 1, 1))
     assert Body(**BOX, velocity=(3, 4, 0), wave=wave).top_speed == pytest.approx(5.5)
@@ -168,6 +176,7 @@ def test_bodies_that_make_no_sense_are_refused(table, words):
 
 def test_defaults_of_a_body():
     body = Body(**BOX)
+    assert Body(**{**BOX, "size": (0.1, 0.2, 0.3)}).volume == pytest.approx(0.006)
     assert body.start == 0.0 and not body.clamped and body.velocity == body.angular_velocity == (0, 0, 0)
     assert Body(**BOX, start=1.0, velocity=(1, 0, 0)).start == 1.0
     assert Body(**BOX, angular_velocity=(0, 0, 1), velocity_gradient=((1, 0, 0), (0, 0, 0), (0, 0, 0)))
@@ -193,6 +202,7 @@ def test_parts_that_make_no_sense_are_refused_and_defaults():
             Part(center=(0, 0, 0), **table)
     with pytest.raises(ValidationError, match="a sphere needs radius"):
         Part(kind="sphere", center=(0, 0, 0))
+    assert Part(kind="box", center=(0, 0, 0), size=(0.1, 0.2, 0.3)).half == pytest.approx([0.05, 0.1, 0.15])
     ball = Part(kind="sphere", center=(0, 0, 4), radius=2.0)
     assert Collider(parts=(ball,)).friction == 0.3 and Collider(parts=(ball,)).clearance == 0.0
     with pytest.raises(ValidationError, match="greater than or equal to 0"):

@@ -21,19 +21,20 @@ def rows(points):
 
 def test_a_disc_takes_the_lattice_nearest_to_its_area():
     """Radius 1: a quarter off the lattice 3 points fit, of 3.14. Radius 1.5: half off in x 8 fit, of 7.07, as many as a
-    quarter off; the first found stays. Then each is moved outwards until it owns its share."""
+    quarter off; the first found stays, and its rim counts, though 1.5 * 0.1 is a little more than 0.15.
+    Then each is moved outwards until it owns its share."""
     expected = np.array([[0.25, 0.25], [-0.75, 0.25], [0.25, -0.75]]) * math.sqrt(math.pi / 3)
     assert rows(disc(0.1, 0.1)) == pytest.approx(0.1 * rows(expected))
     half = [[x, y] for x in (-0.5, 0.5) for y in (-1, 0, 1)] + [[-1.5, 0], [1.5, 0]]
-    assert rows(disc(3.0, 2.0)) == pytest.approx(2.0 * rows(np.array(half) * math.sqrt(2.25 * math.pi / 8)))
+    assert rows(disc(0.15, 0.1)) == pytest.approx(0.1 * rows(np.array(half) * math.sqrt(2.25 * math.pi / 8)))
 
 
 @pytest.mark.parametrize("radius", [1.2, 2.0, 3.3, 4.0, 7.1])
 def test_points_of_a_disc_own_its_area(radius):
     """Nearest neighbours are a stretched spacing apart, and n stretched cells are the circle."""
-    points = disc(radius, 1.0)
+    points = disc(0.1 * radius, 0.1)
     gaps = np.linalg.norm(points[:, None] - points[None], axis=-1) + 1e9 * np.eye(len(points))
-    assert len(points) * gaps.min() ** 2 == pytest.approx(math.pi * radius**2)
+    assert len(points) * gaps.min() ** 2 == pytest.approx(math.pi * (0.1 * radius) ** 2)
     assert abs(len(points) / (math.pi * radius**2) - 1) < 0.2
 
 
@@ -42,6 +43,7 @@ def test_discs_leave_half_a_period_early_and_carry_exactly_what_was_fed():
     stream = Stream(bead(duration=0.5))
     assert stream.extruding == pytest.approx(0.01 + 0.02 * np.arange(15))
     assert stream.release_time == pytest.approx(stream.extruding) and stream.particles == 15 * len(stream.offsets)
+    assert stream.offsets.tolist() == disc(0.006, 0.002).tolist()
     assert stream.volume * len(stream.offsets) == pytest.approx(AREA * 0.002)
     assert [stream.released(t) for t in (0.0, 0.0099, 0.0101, 0.0299, 0.0301, 0.2911, 9.0)] == [0, 0, 1, 1, 2, 15, 15]
     assert stream.released(float(stream.release_time[3])) == 4
@@ -51,7 +53,7 @@ def test_discs_leave_half_a_period_early_and_carry_exactly_what_was_fed():
     assert stream.velocity == pytest.approx(np.tile([0.1, 0.0, -0.1], (15, 1)))
 
 
-@pytest.mark.parametrize(("duration", "discs"), [(0.1, 5), (0.089, 4), (0.0901, 5), (0.3, 15), (5.0, 15)])
+@pytest.mark.parametrize(("duration", "discs"), [(0.1, 5), (0.089, 4), (0.0901, 5), (0.15, 8), (0.3, 15), (5.0, 15)])
 def test_the_stream_ends_with_the_path_or_the_run(duration, discs):
     assert len(Stream(bead(duration=duration)).extruding) == discs
 
@@ -76,6 +78,12 @@ def test_pauses_hold_the_stream_back_and_corners_turn_it():
     assert stream.velocity == pytest.approx(np.repeat([[*way, -0.1] for way in ways], 15, axis=0))
 
 
+def test_a_disc_released_at_a_corner_still_moves_as_the_nozzle_did():
+    path = {"kind": "polyline", "points": [[0, 0], [0.005, 0], [0.005, 0.01]], "speed": 0.1}
+    velocity = Stream(bead(toolpath=path, duration=2.0)).velocity
+    assert velocity[:4] == pytest.approx(np.array([[0.1, 0, -0.1]] * 3 + [[0, 0.1, -0.1]]))
+
+
 def body(**table):
     return {"kind": "box", "center": [0.05, 0.05, 0.05], "size": [0.08, 0.05, 0.034], **table}
 
@@ -87,6 +95,8 @@ def test_a_box_is_a_lattice_stretched_to_its_faces():
     axes = [0.05 + (np.arange(n) + 0.5 - n / 2) * size for n, size in ((8, 0.01), (5, 0.01), (3, 0.034 / 3))]
     expected = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     assert rows(points) == pytest.approx(rows(expected)) and volume == pytest.approx(0.01 * 0.01 * 0.034 / 3)
+    tall = scenario(bodies=[body(size=[0.04, 0.04, 0.036])])
+    assert len(sample(tall.bodies[0], tall)[0]) == 4 * 4 * 4  # 3.6 layers are nearer to four than to three
     thin = scenario(bodies=[body(size=[0.04, 0.04, 0.0101])])
     assert len(sample(thin.bodies[0], thin)[0]) == 16
 
@@ -164,5 +174,7 @@ def test_the_largest_particles_decide_how_often_growth_halves():
     """A box of 15 mm is one layer of 15 mm: half as much again as the spacing, one halving more."""
     s = foam({"ratio": 3.0})
     assert generations(s) == 1
-    thick = scenario(material=s.material.model_dump(), bodies=[body(size=[0.04, 0.04, 0.0149]), body()])
-    assert [n for n, _ in sources(thick)] == [16, 120] and generations(thick) == 2
+    thick = scenario(
+        material=s.material.model_dump(), bodies=[body(size=[0.04, 0.04, 0.0149]), *s.model_dump()["bodies"]]
+    )
+    assert [n for n, _ in sources(thick)] == [16, 100] and generations(thick) == 2
