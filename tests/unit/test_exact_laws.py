@@ -36,6 +36,7 @@ def test_pressure(compression, bulk, tait, limit, expected):
         (300.0, 100.0, 3.0, 1.0, 2.0, 220.0),  # 100 + 200 * 3 / (3 + 2)
         (300.0, 100.0, 0.0, 0.5, 2.0, 100.0),  # perfectly plastic whatever the exponent
         (40.0, 10.0, 4.0, 0.5, 2.0, 22.0),  # r = 9: 10 + 4 * 3, and 40 - 2 * 9
+        (51.2, 1.0, 0.04, 0.5, 2.0, 1.2),  # r = 25: 1 + 0.04 * 5, and 51.2 - 2 * 25
         (32.0, 10.0, 3.0, 2.0, 5.0, 22.0),  # r = 2: 10 + 3 * 4, and 32 - 5 * 2
         (1041.0, 1.0, 2.0, 2.0, 84.0, 201.0),  # r = 10: 1 + 2 * 100, and 1041 - 84 * 10
     ],
@@ -44,7 +45,7 @@ def test_flow_stress(trial, threshold, consistency, index, stiffness, expected):
     assert flow_stress(trial, threshold, consistency, index, stiffness) == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("index", [0.2, 0.5, 0.9, 1.3, 3.0])
+@pytest.mark.parametrize("index", [0.2, 0.5, 0.9, 1.05, 1.3, 3.0])
 @pytest.mark.parametrize("rate", [1e-4, 1e-2, 1.0, 50.0])
 @pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e3])
 def test_flow_stress_meets_its_equation_over_seven_decades(index, rate, stiffness):
@@ -83,7 +84,7 @@ def after_step(l, b, shear, threshold, consistency, relaxation, dt):
 
 
 L = np.array([[3.0, -7.0, 2.0], [5.0, 1.0, -4.0], [-6.0, 8.0, 2.5]])
-B = matrix([1.3, 0.9, 1.1, 0.2, -0.15, 0.25])
+B = matrix([1.3, 0.9, 1.25, 0.2, -0.15, 0.25])
 
 
 @pytest.mark.parametrize("threshold", [1e30, 30.0, 0.0])
@@ -163,6 +164,7 @@ def test_what_position_based_sweeps_can_stand_for():
     ("ratio", "share"),
     [
         (0.8, 1.0), (1.0, 1.0), (1.2, 1.0 - 0.5 * 0.2 / (math.sqrt(2) - 1)), (math.sqrt(2), 0.5),
+        (1.45, 0.1875 + 0.3125 * (math.sqrt(3) - 1.45) / (math.sqrt(3) - math.sqrt(2))),
         (1.6, 0.1875 + 0.3125 * (math.sqrt(3) - 1.6) / (math.sqrt(3) - math.sqrt(2))), (math.sqrt(3), 0.1875),
         (1.8, 0.1875 - 0.3125 * (1.8 - math.sqrt(3)) / (math.sqrt(3) - math.sqrt(2))), (2.5, 0.05),
     ],
