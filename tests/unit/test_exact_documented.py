@@ -1,0 +1,110 @@
+"""What the manual says: every key of docs/scenario.md with its default, and the limits beyond which methods refuse."""
+
+from pathlib import Path
+
+import pytest
+
+from fluidbench.body import Body
+from fluidbench.collider import Collider, Part
+from fluidbench.cure import Cure
+from fluidbench.expansion import Expansion
+from fluidbench.material import Material
+from fluidbench.scenario import Domain, Nozzle, Scenario, Walls
+from fluidbench.solver import get_solver
+from fluidbench.toolpath import Toolpath
+
+from ..conftest import scenario
+
+MODELS = {
+    "Top level": [Scenario], "[domain]": [Domain], "[domain.walls]": [Walls], "[material]": [Material],
+    "[material.cure]": [Cure], "[material.expansion]": [Expansion], "[nozzle]": [Nozzle], "[toolpath]": [Toolpath],
+    "[collider]": [Collider, Part], "[[bodies]]": [Body],
+    **{f"[numerics.{method}]": [get_solver(method).Config] for method in ("mpm", "sph", "pbd")},
+}  # fmt: skip
+TABLES = {"cure", "expansion", "parts"}  # which have rows of their own
+WORDS = {"none": None, "(empty)": "", "true": True, "false": False, "()": (), "{}": {}}
+
+
+def documented():
+    """{section: {key: default as it is written}}."""
+    found, section = {}, None
+    for line in (Path(__file__).parents[2] / "docs" / "scenario.md").read_text().splitlines():
+        if line.startswith("## "):
+            section = found.setdefault(line[3:], {})
+        elif line.startswith("| `") and section is not None:
+            key, default = (cell.strip() for cell in line.split("|")[1:3])
+            section[key.strip("`")] = default
+    return found
+
+
+@pytest.mark.parametrize("section", MODELS)
+def test_keys_and_defaults_are_as_documented(section):
+    rows = documented()[section]
+    fields = {key: field for model in MODELS[section] for key, field in model.model_fields.items()}
+    assert rows.keys() == fields.keys() - TABLES
+    for key, written in rows.items():
+        field = fields[key]
+        assert field.is_required() == (written == "required"), key
+        if field.is_required() or written == "see below":
+            continue
+        if written in WORDS:
+            assert field.default == WORDS[written], key
+        elif isinstance(field.default, str):
+            assert field.default == written, key
+        elif isinstance(field.default, tuple):
+            assert field.default == tuple(float(v) for v in written.strip("()").split(",")), key
+        else:
+            assert field.default == pytest.approx(float(written), rel=1e-12), key
+
+
+def test_every_section_of_the_manual_has_its_model():
+    assert documented().keys() == MODELS.keys()
+
+
+def moving(speed, **material):
+    """A box that moves at this speed without gravity; 10 ticks of a quarter of a spacing and more."""
+    body = {"kind": "box", "center": [0.1, 0.1, 0.1], "size": [0.08] * 3, "velocity": [speed, 0, 0]}
+    return scenario(bodies=[body], gravity=[0, 0, 0], duration=0.1, material={"density": 1000.0, **material})
+
+
+def refusal(method, made, **settings):
+    solver = get_solver(method)
+    return solver.refuses(made, solver.Config(**settings))
+
+
+def test_sph_refuses_what_moves_at_eight_tenths_of_its_sound_and_foam_at_three():
+    assert refusal("sph", moving(0.79, sound_speed=1.0)) is None
+    assert "0.81 m/s, too near its own sound (1 m/s)" in refusal("sph", moving(0.81, sound_speed=1.0))
+    growth = {"ratio": 1.01, "time": 100.0}
+    assert refusal("sph", moving(0.29, sound_speed=1.0, expansion=growth)) is None
+    assert "too near its own sound" in refusal("sph", moving(0.31, sound_speed=1.0, expansion=growth))
+
+
+def test_pbd_refuses_yield_stresses_that_no_substep_conveys():
+    """An eighth of 10 mm at 1 m/s is 1.25 ms: half of 1000 (d / dt)^2 is 32 kPa."""
+    paste = {"youngs_modulus": 1e6, "plastic_viscosity": 1.0}
+    assert refusal("pbd", moving(1.0, **paste, yield_stress=31.9e3)) is None
+    words = refusal("pbd", moving(1.0, **paste, yield_stress=72e3))
+    assert "(7.2e+04 Pa) exceeds what a substep conveys (3.2e+04 Pa)" in words
+    assert words.endswith("set numerics.pbd.advance = 0.042 or less")  # 0.125 / 2 * sqrt(32 / 72)
+    assert refusal("pbd", moving(1.0, **paste, yield_stress=72e3), advance=0.0625) is None
+    assert "(1.6e+04 Pa)" in refusal("pbd", moving(1.0, **paste, yield_stress=72e3), shear_stiffness=0.25)
+    assert refusal("pbd", moving(1.0, youngs_modulus=1e6, relaxation_time=0.1)) is None
+    assert refusal("pbd", moving(1.0, youngs_modulus=1e4)) is None and refusal("pbd", moving(1.0)) is None
+
+
+def test_pbd_says_how_much_of_a_viscosity_and_of_a_stiffness_is_lost():
+    """rho 8 H^2 / (22 dt) with H = 24 mm is 167.6 Pa s; G = 32 kPa acts in series with the 32 kPa of a substep."""
+    solver = get_solver("pbd")
+    thick = solver.approximates(moving(1.0, viscosity=170.0), solver.Config())
+    assert any("viscosity 170 Pa s acts like at most 168 Pa s" in words for words in thick)
+    assert len(solver.approximates(moving(1.0, viscosity=167.0), solver.Config())) == 1
+    paste = {"poisson_ratio": 0.25, "yield_stress": 10.0}
+    stiff = solver.approximates(moving(1.0, youngs_modulus=8e4, **paste), solver.Config())
+    assert any("shear modulus 3.2e+04 Pa acts like 1.6e+04 Pa" in words for words in stiff)
+    soft = solver.approximates(moving(1.0, youngs_modulus=8e3, **paste), solver.Config())
+    assert not any("acts like" in words for words in soft)  # 3.2 kPa acts like 2.9: more than nine tenths
+    solid = solver.approximates(moving(1.0, youngs_modulus=3e4), solver.Config())
+    assert any("Poisson ratio 1/4" in words for words in solid) and not any("beyond" in words for words in solid)
+    solid = solver.approximates(moving(1.0, youngs_modulus=4e4), solver.Config())  # a tenth of 0.25 * 20 * 64 kPa is 32
+    assert any("beyond 3.2e+05 Pa acts like that" in words for words in solid)
