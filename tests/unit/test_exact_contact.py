@@ -79,6 +79,8 @@ def test_what_does_not_touch_comes_not_nearer_or_is_held_is_left_alone():
     before = np.array([[1, 0, 2], [1, 2, -0.11], [1, 2, -3], [1, 0, 2], [1, 0, 2], [1, 0, 2]], np.float32)
     got = touch(places, before, held, spare=1)
     assert (got == before).all()
+    odd = np.array([[1 / 3, 1 / 7, 1 / 11]] * 2, np.float32)  # no bit changes, however fast the part
+    assert (touch([below(-0.01), below(-0.002)], odd, speed=0.2) == odd).all()
     slow = touch([below(0.001)], [[0.0, 0.0, -0.09]])  # leaves, but not fast enough
     assert slow[0] == pytest.approx([0, 0, -0.1], abs=2e-4)
 
