@@ -63,7 +63,6 @@ def test_sections_stand_square_to_the_leg_they_lie_on():
     ("more", "reach"),
     [
         ({}, 0.03),
-        ({"toolpath": {**LINE, "radius": 0.01}}, 0.03),  # which means nothing on a line
         ({"material": {"density": 100.0, "expansion": {"ratio": 8.0}}}, 0.06),
         ({"toolpath": {"kind": "ring", "center": [0.02, 0.0], "radius": 0.015, "speed": 0.1}}, 0.015),
         ({"toolpath": {"kind": "ring", "center": [0.02, 0.0], "radius": 0.031, "speed": 0.1}}, 0.03),

@@ -21,7 +21,7 @@ HALF = np.array([0.02, 0.03, 0.04])
 def touch(places, velocities, held=0, friction=0.3, parts=(BLOCK,), substeps=1, speed=0.0, now=0.0, spare=0):
     """Velocities (n, 3) of particles at these places after some substeps of 1 ms; `spare` last ones are not active."""
     places, n = np.asarray(places, np.float32), len(places)
-    path = {"start": [0.0, 0.0], "end": [0.1, 0.0], "speed": speed, "dwell": 1.0}
+    path = {"start": [0.0, 0.0], "speed": speed, **({"end": [0.1, 0.0]} if speed else {"dwell": 1.0})}
     body = {"kind": "box", "center": [-0.2, 0.0, 0.02], "size": [0.04, 0.04, 0.01 * max(n - spare, 16) / 16]}
     table = scenario(
         domain={"lower": [-0.3] * 3, "upper": [0.3] * 3}, spacing=D, bodies=[body], toolpath=path, duration=1.0,

@@ -156,10 +156,10 @@ def test_offspring_of_growth():
         ({"ratio": 0.999}, "would shrink"),
         ({"ratio": math.inf}, "finite"),
         ({"delay": 1.0, "jitter": 1.01}, "exceeds delay"),
-        ({"passes": 0}, "greater than or equal to 1"),
-        ({"passes": 17}, "less than or equal to 16"),
+        ({"kind": "spawn", "passes": 0}, "greater than or equal to 1"),
+        ({"kind": "spawn", "passes": 17}, "less than or equal to 16"),
         ({"time": 0.0}, "greater than 0"),
-        ({"interval": 0.0}, "greater than 0"),
+        ({"kind": "spawn", "interval": 0.0}, "greater than 0"),
     ],
 )
 def test_expansions_that_make_no_sense_are_refused(table, words):
@@ -172,4 +172,4 @@ def test_defaults_and_edges_of_an_expansion():
     assert (plain.kind, plain.delay, plain.jitter, plain.time, plain.split) == ("growth", 0.0, 0.0, 1.0, True)
     assert (plain.passes, plain.interval, plain.radius, plain.impulse, plain.noise) == (1, 0.1, 1.0, 0.0, 0.0)
     assert plain.margin == 0.5 and plain.volume_ratio(5.0) == 1.0
-    assert Expansion(ratio=2.0, delay=1.0, jitter=1.0, passes=16).per_pass == pytest.approx(2 ** (1 / 16))
+    assert Expansion(kind="spawn", ratio=2.0, delay=1.0, jitter=1.0, passes=16).per_pass == pytest.approx(2 ** (1 / 16))

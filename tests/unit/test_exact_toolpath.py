@@ -102,6 +102,7 @@ def test_corners_of_lines_and_walls():
     assert Toolpath(start=(0, 1), speed=0.0, dwell=1.0).corners().tolist() == [[0, 1], [0, 1]]
 
 
+NOWHERE = {"start": None, "end": None}
 LINE = {"kind": "line", "start": (0, 0), "end": (1, 0), "speed": 1.0}
 
 
@@ -111,9 +112,9 @@ LINE = {"kind": "line", "start": (0, 0), "end": (1, 0), "speed": 1.0}
         ({"start": None}, "a line needs start"),
         ({"kind": "wall", "end": None}, "a wall needs end"),
         ({"kind": "wall", "start": None, "end": None}, "a wall needs start and end"),
-        ({"kind": "polyline"}, "a polyline needs points"),
-        ({"kind": "ring", "radius": 1.0}, "a ring needs center"),
-        ({"kind": "ring", "center": (0, 0)}, "a ring needs radius"),
+        ({"kind": "polyline", **NOWHERE}, "a polyline needs points"),
+        ({"kind": "ring", "radius": 1.0, **NOWHERE}, "a ring needs center"),
+        ({"kind": "ring", "center": (0, 0), **NOWHERE}, "a ring needs radius"),
         ({"layers": 2}, "more than one layer needs layer_height"),
         ({"speed": 0.0}, "needs dwell"),
         ({"end": None}, "the path has no length"),
