@@ -18,8 +18,9 @@ MIDDLE = np.array([0.0, 0.06, 0.06])  # of the block: exit at z = 0.05, raised b
 HALF = np.array([0.02, 0.03, 0.04])
 
 
-def touch(places, velocities, held=0, friction=0.3, parts=(BLOCK,), substeps=1, speed=0.0, now=0.0, spare=0):
-    """Velocities (n, 3) of particles at these places after some substeps of 1 ms; `spare` last ones are not active."""
+def touch(places, velocities, held=0, friction=0.3, parts=(BLOCK,), substeps=1, speed=0.0, now=0.0, spare=0, earlier=0):
+    """Velocities (n, 3) of particles at these places after some substeps of 1 ms, `earlier` ones in the tick before;
+    `spare` last ones are not active."""
     places, n = np.asarray(places, np.float32), len(places)
     path = {"start": [0.0, 0.0], "speed": speed, **({"end": [0.1, 0.0]} if speed else {"dwell": 1.0})}
     body = {"kind": "box", "center": [-0.2, 0.0, 0.02], "size": [0.04, 0.04, 0.01 * max(n - spare, 16) / 16]}
@@ -40,9 +41,10 @@ def touch(places, velocities, held=0, friction=0.3, parts=(BLOCK,), substeps=1, 
         pool.set_count(world, n - spare)
     contact = Contact(scene, pool)
     scene.set_dt(DT)
-    contact.advance(now, 0.004)
-    for _ in range(substeps):
-        contact.substep()
+    for start, number in ((now - 0.004, earlier), (now, substeps)):
+        contact.advance(start, 0.004)
+        for _ in range(number):
+            contact.substep()
     after = pool.velocity.numpy().copy()
     assert (after[:n] == after[pool.capacity : pool.capacity + n]).all()
     assert (pool.position.numpy()[:n] == places).all()
@@ -119,12 +121,13 @@ def test_a_ball_pushes_outwards_and_every_part_acts():
     assert turned == pytest.approx(slide * (1 - 0.5 * 0.2 / np.linalg.norm(slide)) + 0.2 * arm, abs=1e-3)
 
 
-@pytest.mark.parametrize("now", [0.0, 0.25])
-def test_a_moving_part_carries_on_within_the_tick_and_pushes_at_its_own_speed(now):
+@pytest.mark.parametrize("earlier", [0, 3])
+@pytest.mark.parametrize("now", [0.004, 0.25])
+def test_a_moving_part_carries_on_within_the_tick_and_pushes_at_its_own_speed(now, earlier):
     """0.2 m/s, 0.2 mm a substep; 0.1 mm beyond the skin it meets after the first, then 0.1 mm in, then 0.3 mm."""
     place = [[0.2 * now + HALF[0] + 0.5 * D + 1e-4, 0.061, 0.061]]
     for substeps, expected in ((1, 0.2 + 0.01), (2, 0.2 + 0.03), (3, 0.2 + 0.05)):
-        got = touch(place, np.zeros((1, 3)), friction=0.0, speed=0.2, now=now, substeps=substeps)
+        got = touch(place, np.zeros((1, 3)), friction=0.0, speed=0.2, now=now, substeps=substeps, earlier=earlier)
         assert got[0] == pytest.approx([expected, 0.0, 0.0], abs=2e-4)
 
 

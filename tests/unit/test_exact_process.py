@@ -97,6 +97,43 @@ def test_every_disc_comes_once_and_solvers_hear_of_it():
     assert frame["mass"][64:].astype(float).sum() == pytest.approx(15 * FULL)
 
 
+def copied(pool, other):
+    """What a checkpoint carries of a pool, put into another one."""
+    for name, array in pool.fields.items():
+        other.fields[name].assign(array.numpy())
+    other.set_count(0, pool.counts[0])
+
+
+def test_feeding_goes_on_from_where_another_one_came_to():
+    (pool, emission, stream), (other, second, _) = fed(1000.0), fed(1000.0)
+    for now in (0.0, 0.0305):
+        emission.advance(now, 0.004)
+    assert emission.progress() == [stream.entered(0.0305) * len(stream.offsets), 2]
+    copied(pool, other)
+    second.go_on(emission.progress())
+    for each in (emission, second):
+        each.advance(0.0705, 0.004)
+    assert second.progress() == emission.progress() and other.counts == pool.counts
+    once, again = pool.snapshot(), other.snapshot()
+    assert all((once[name] == again[name]).all() for name in once)
+
+
+def test_laying_goes_on_from_where_another_one_came_to():
+    bodies = [{**BLOCK, "start": start} for start in (0.0, 0.1, 0.2)]
+    s = bead(bodies=bodies, duration=0.5)
+    pools = [Pool(Scene(s), capacity_of(s)) for _ in range(2)]
+    first, second = (Laying(s, pool) for pool in pools)
+    first.advance(0.15)
+    assert first.progress() == [1, 128 + Stream(s).particles]
+    copied(*pools)
+    second.go_on(first.progress())
+    for each in (first, second):
+        each.advance(0.15)
+        each.advance(0.25)
+    once, again = (pool.snapshot() for pool in pools)
+    assert len(once["mass"]) == 192 and all((once[name] == again[name]).all() for name in once)
+
+
 def test_bodies_are_laid_at_their_start_in_order_after_the_stream():
     def box(x, start, **more):
         return {"kind": "box", "center": [x, 0.0, 0.004], "size": [0.004] * 3, "start": start, **more}

@@ -115,6 +115,14 @@ LINE = {"kind": "line", "start": (0, 0), "end": (1, 0), "speed": 1.0}
         ({"kind": "polyline", **NOWHERE}, "a polyline needs points"),
         ({"kind": "ring", "radius": 1.0, **NOWHERE}, "a ring needs center"),
         ({"kind": "ring", "center": (0, 0), **NOWHERE}, "a ring needs radius"),
+        ({"dwell": 1.0}, "dwell has no effect"),
+        ({"kind": "polyline", "points": ((0, 0),), **NOWHERE}, "at least two points"),
+        ({"kind": "polyline", "points": (), "speed": 0.0, "dwell": 1.0, **NOWHERE}, "at least two points"),
+        ({"kind": "polyline", "points": ((0, 0), (1, 0)), "end": None}, "start has no effect"),
+        ({"kind": "polyline", "points": ((0, 0), (1, 0)), "start": None}, "end has no effect"),
+        ({"points": ((0, 0), (1, 0))}, "points has no effect"),
+        ({"center": (0, 0)}, "center has no effect"),
+        ({"kind": "wall", "radius": 1.0}, "radius has no effect"),
         ({"layers": 2}, "more than one layer needs layer_height"),
         ({"speed": 0.0}, "needs dwell"),
         ({"end": None}, "the path has no length"),
@@ -138,5 +146,7 @@ def test_paths_at_the_edge_of_sense_are_accepted():
     assert path.layers == 1 and path.pause == 0.0 and path.length() == 1.0
     assert Toolpath(**{**LINE, "layers": 10_000, "layer_height": 1e-9}).layers == 10_000
     assert Toolpath(start=(0, 0), end=(1, 0), speed=0.0, dwell=1.0).length() == 1.0
+    assert Toolpath(kind="polyline", points=((0, 0), (3, 4)), speed=1.0).length() == 5.0
+    assert Toolpath(kind="polyline", points=((3, 4),), speed=0.0, dwell=1.0).corners().tolist() == [[3, 4]]
     with pytest.raises(ValidationError, match="frozen"):
         path.speed = 2.0
