@@ -163,6 +163,9 @@ def test_top_speed_is_that_of_the_fastest_corner_plus_the_crest():
         ({**BOX, "size": (1, 1, 0)}, "size must be positive"),
         ({**CYLINDER, "radius": None, "height": None}, "a cylinder needs radius and height"),
         ({**SPHERE, "radius": None}, "a sphere needs radius"),
+        ({**BOX, "radius": 1.0}, "radius has no effect"),
+        ({**SPHERE, "height": 1.0}, "height has no effect"),
+        ({**CYLINDER, "size": (1, 1, 1)}, "size has no effect"),
         ({**BOX, "start": -1.0}, "greater than or equal to 0"),
         ({**BOX, "start": 1.0, "angular_velocity": (0, 0, 1)}, "appears later"),
         ({**BOX, "start": 1.0, "velocity_gradient": ((1, 0, 0), (0, 0, 0), (0, 0, 0))}, "appears later"),
@@ -200,6 +203,12 @@ def test_parts_that_make_no_sense_are_refused_and_defaults():
     for table in ({"kind": "box"}, {"kind": "box", "size": (1, 1, 0)}):
         with pytest.raises(ValidationError, match="a box needs size"):
             Part(center=(0, 0, 0), **table)
+    with pytest.raises(ValidationError, match="radius has no effect"):
+        Part(kind="box", center=(0, 0, 0), size=(1, 1, 1), radius=1.0)
+    with pytest.raises(ValidationError, match="size has no effect"):
+        Part(kind="sphere", center=(0, 0, 0), size=(1, 1, 1), radius=1.0)
+    with pytest.raises(ValidationError, match="at least 1 item"):
+        Collider(parts=())
     with pytest.raises(ValidationError, match="a sphere needs radius"):
         Part(kind="sphere", center=(0, 0, 0))
     assert Part(kind="box", center=(0, 0, 0), size=(0.1, 0.2, 0.3)).half == pytest.approx([0.05, 0.1, 0.15])
