@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fluidbench.particles import CARRIED, FREE, Pool
+from fluidbench.particles import CARRIED, FREE, OutOfCapacity, Pool
 from fluidbench.process.expansion import Growing
 from fluidbench.process.laying import Laying
 from fluidbench.scene import Scene
@@ -139,6 +139,15 @@ def test_a_litter_shares_mass_and_volume_in_a_ball_about_its_parent():
     assert (pool.generation.numpy()[family] == 1).all() and pool.counts == [4096]
     grown.advance(9.0, 0.001)
     assert pool.counts == [4096]
+
+
+def test_children_that_find_no_room_end_the_run():
+    grown, pool = growing(SPAWN, capacity=512)
+    grown.advance(0.2001, 0.001)
+    assert pool.counts == [512]
+    grown, _ = growing(SPAWN, capacity=511 - 31)
+    with pytest.raises(OutOfCapacity, match="holds 480 particles a world and 512 are needed"):
+        grown.advance(0.2001, 0.001)
 
 
 def test_noise_has_its_size_in_every_direction_and_no_mean():

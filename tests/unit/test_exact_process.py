@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from fluidbench.layout import capacity_of
-from fluidbench.particles import CARRIED, CLAMPED, FREE, Pool
+from fluidbench.particles import CARRIED, CLAMPED, FREE, OutOfCapacity, Pool
 from fluidbench.process.chance import Chance, chance_of, direction, uniform
 from fluidbench.process.curing import Curing
 from fluidbench.process.emission import Emission
@@ -95,6 +95,14 @@ def test_every_disc_comes_once_and_solvers_hear_of_it():
     frame = pool.snapshot()
     assert list(frame["origin"]) == list(range(64 + stream.particles)) and not (frame["held"] == int(CARRIED)).any()
     assert frame["mass"][64:].astype(float).sum() == pytest.approx(15 * FULL)
+
+
+def test_a_disc_that_finds_no_room_ends_the_run():
+    made = bead(duration=0.5, bodies=[BLOCK])
+    pool = Pool(Scene(made), 96)
+    Laying(made, pool)
+    with pytest.raises(OutOfCapacity, match="holds 96 particles a world and"):
+        Emission(pool.scene, pool).advance(0.0, 0.004)
 
 
 def copied(pool, other):
