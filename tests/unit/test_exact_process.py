@@ -146,22 +146,30 @@ def test_bodies_are_laid_at_their_start_in_order_after_the_stream():
     def box(x, start, **more):
         return {"kind": "box", "center": [x, 0.0, 0.004], "size": [0.004] * 3, "start": start, **more}
 
-    bodies = [box(0.03, 0.2, velocity=[1, 2, 3]), box(0.02, 0.0), box(0.01, 0.1, clamped=True)]
+    bodies = [box(0.03, 0.2, velocity=[1, 2, 3]), box(0.02, 0.0), box(0.01, 0.04, clamped=True)]
     s = bead(bodies=bodies, duration=0.5)
     pool = Pool(Scene(s), capacity_of(s))
     laying, fed = Laying(s, pool), Stream(s).particles
-    counts = []
-    for now in (0.0, 0.0999, 0.1, 0.15, 0.2, 0.3):
+    counts = pool.counts.copy()
+    for now in (0.0, 0.0399, 0.04, 0.15, 0.2 - 1e-11, 0.3):  # rounding lays nothing a tick late
         laying.advance(now)
         counts.append(pool.counts[0])
-    assert counts == [8, 8, 16, 16, 24, 24] and laying.placed == 24 + fed
+    assert counts == [8, 8, 8, 16, 16, 24, 24] and laying.placed == 24 + fed
     frame = pool.snapshot()
     assert list(frame["origin"]) == [*range(8), *range(8 + fed, 24 + fed)]
-    assert frame["birth_time"] == pytest.approx(np.repeat([0.0, 0.1, 0.2], 8))
+    assert frame["birth_time"] == pytest.approx(np.repeat([0.0, 0.04, 0.2], 8))
     assert frame["position"][:, 0].reshape(3, 8).mean(axis=1) == pytest.approx([0.02, 0.01, 0.03])
     assert list(frame["held"]) == [int(FREE)] * 8 + [int(CLAMPED)] * 8 + [int(FREE)] * 8
     assert frame["velocity"].reshape(3, 8, 3).tolist() == [[[0, 0, 0]] * 8, [[0, 0, 0]] * 8, [[1, 2, 3]] * 8]
     assert frame["mass"] == pytest.approx(np.full(24, 1000.0 * 0.002**3))
+
+
+def test_without_a_nozzle_bodies_are_numbered_throughout():
+    cube = {"kind": "box", "center": [0.05] * 3, "size": [0.02] * 3}
+    s = scenario(bodies=[{**cube, "start": 0.005}, cube])
+    pool = Pool(Scene(s), capacity_of(s))
+    Laying(s, pool).advance(0.005)
+    assert list(pool.snapshot()["origin"]) == list(range(16))
 
 
 KINDS = {
@@ -200,6 +208,12 @@ def test_the_level_is_the_nearest_to_the_degree_of_cure_at_the_age(kind):
     near = np.abs(degrees % 1.0 - 0.5) < 1e-4
     expected = np.floor(degrees + (0.5 if model.levels == 100 else 1e-6))
     assert near.sum() <= 2 and (due == expected)[~near].all() and due.max() == model.levels > due.min() == 0
+
+
+def test_a_level_is_reached_at_its_very_age():
+    births = np.array([1.0, 1.001, 0.999, 0.5, 0.499, 0.501, 0.0, -1.0])
+    assert curing(2.0, births, kind="jump")[0].tolist() == [1, 0, 1, 1, 1, 1, 1, 1]
+    assert curing(2.0, births, kind="stages", time=1.0, stages=2)[0].tolist() == [0, 0, 0, 1, 1, 0, 2, 2]
 
 
 def test_what_is_in_the_nozzle_does_not_cure_and_nothing_softens_again():
@@ -246,6 +260,11 @@ def test_chance_is_even_and_depends_on_everything_that_it_is_asked_for():
         assert abs(np.corrcoef(first, again)[0, 1]) < 0.02
     assert abs(np.corrcoef(first[:-1], first[1:])[0, 1]) < 0.02
     assert all(0 <= chance_of(seed, "test").key < 2**31 for seed in range(50))
+    turn = 2 * np.pi * drawn(n, draw=1)[0]  # a direction takes two draws: its height and its turn
+    assert way[:, 2] == pytest.approx(2 * first - 1, abs=1e-6)
+    flat = np.sqrt(1 - way[:, 2] ** 2)
+    assert way[:, 0] == pytest.approx(flat * np.cos(turn), abs=2e-3)
+    assert way[:, 1] == pytest.approx(flat * np.sin(turn), abs=2e-3)
     assert np.linalg.norm(way, axis=1) == pytest.approx(np.ones(len(n)), abs=1e-5)
     assert way.mean(axis=0) == pytest.approx(np.zeros(3), abs=0.015)
     assert way.T @ way / len(n) == pytest.approx(np.eye(3) / 3, abs=0.01)
