@@ -70,12 +70,12 @@ def test_walls_mirror_what_would_lie_behind_them(axis, upper):
 
 @pytest.mark.parametrize("away", range(6))
 def test_the_field_never_reaches_beyond_the_walls(away):
-    """However many cells from them the only particle lies; rounding adds no cell to a box of seven."""
-    seven = Domain(lower=(0.1, 0.1, 0.1), upper=(0.8, 0.8, 0.8))
-    for cell in ([away] * 3, [6 - away] * 3):
-        deposit = spread([0.1 + 0.1 * (np.array(cell) + 0.5)], [1e-3], seven, 0.1)
-        low = (deposit.origin - 0.1) / 0.1 - 0.5
-        assert (low > -0.01).all() and (low + deposit.fill.shape < 7.01).all()
+    """However many cells from them the only particle lies; 0.3 / 0.05 is a little more than 6, and rounding adds none."""
+    six = Domain(lower=(0.1, 0.1, 0.1), upper=(0.4, 0.4, 0.4))
+    for cell in ([away] * 3, [5 - away] * 3):
+        deposit = spread([0.1 + 0.05 * (np.array(cell) + 0.5)], [1e-3], six, 0.05)
+        low = (deposit.origin - 0.1) / 0.05 - 0.5
+        assert (low > -0.01).all() and (low + deposit.fill.shape < 6.01).all()
         assert deposit.volume() == pytest.approx(1e-3)
 
 
@@ -149,7 +149,7 @@ def test_a_cut_lies_square_to_its_direction_and_rises_from_the_floor():
     def field(p):
         arm = p[..., :2] - point
         along, across = arm @ direction, arm @ [-0.6, 0.8]
-        return 7 * across + 11 * (p[..., 2] - floor) + 100 * along**2
+        return 7 * across + 11 * (p[..., 2] - floor) + 5 * along + 100 * along**2
 
     section = cut(grid_deposit(field), point, direction, 0.55, 0.9, floor)
     step = 0.1 / 4

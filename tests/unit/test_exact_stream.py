@@ -53,7 +53,9 @@ def test_discs_leave_half_a_period_early_and_carry_exactly_what_was_fed():
     assert stream.velocity == pytest.approx(np.tile([0.1, 0.0, -0.1], (15, 1)))
 
 
-@pytest.mark.parametrize(("duration", "discs"), [(0.1, 5), (0.089, 4), (0.0901, 5), (0.15, 8), (0.3, 15), (5.0, 15)])
+@pytest.mark.parametrize(
+    ("duration", "discs"), [(0.1, 5), (0.089, 4), (0.0901, 5), (0.15, 8), (0.29, 15), (0.3, 15), (5.0, 15)]
+)
 def test_the_stream_ends_with_the_path_or_the_run(duration, discs):
     assert len(Stream(bead(duration=duration)).extruding) == discs
 
