@@ -70,7 +70,7 @@ def test_walls_mirror_what_would_lie_behind_them(axis, upper):
 
 @pytest.mark.parametrize("away", range(6))
 def test_the_field_never_reaches_beyond_the_walls(away):
-    """However many cells from them the only particle lies; 0.3 / 0.05 is a little more than 6, and rounding adds none."""
+    """However many cells from them the only particle lies; 0.3 / 0.05 is a little more than 6: no cell more."""
     six = Domain(lower=(0.1, 0.1, 0.1), upper=(0.4, 0.4, 0.4))
     for cell in ([away] * 3, [5 - away] * 3):
         deposit = spread([0.1 + 0.05 * (np.array(cell) + 0.5)], [1e-3], six, 0.05)

@@ -46,6 +46,18 @@ def test_growth_over_a_tick_is_the_ratio_of_the_volumes_at_its_ends(ratio, tick)
     assert pool.counts == [64]
 
 
+@pytest.mark.parametrize(("ratio", "tick", "tolerance"), [(1.45, 0.001, 2e-4), (1.01, 0.02, 5e-4)])
+def test_small_growth_keeps_its_precision(ratio, tick, tolerance):
+    """Gains below a thousandth, as large as they come: both of their second-order terms count."""
+    births = np.linspace(0.28, 0.33, 64).astype(np.float32)
+    grown, pool = growing({"ratio": ratio, "delay": 0.25, "time": 0.5}, birth_time=births)
+    grown.advance(0.6, tick)
+    volume = grown.model.volume_ratio
+    expected = [math.log(volume(0.6 - b + tick) / volume(0.6 - b)) / tick for b in births.astype(float)]
+    assert 3e-4 < max(expected) * tick < 1e-3
+    assert pool.growth.numpy()[:64] == pytest.approx(np.array(expected), rel=tolerance)
+
+
 def test_growth_stands_still_in_the_nozzle():
     held = [int(CARRIED)] * 32 + [int(FREE)] * 32
     grown, pool = growing({"ratio": 10.0}, held=held)
@@ -139,6 +151,17 @@ def test_a_litter_shares_mass_and_volume_in_a_ball_about_its_parent():
     assert (pool.generation.numpy()[family] == 1).all() and pool.counts == [4096]
     grown.advance(9.0, 0.001)
     assert pool.counts == [4096]
+
+
+@pytest.mark.parametrize("model", [{**SPAWN, "ratio": 2.5, "noise": 0.1}, {"ratio": 9.0}])
+def test_worlds_give_birth_alike(model):
+    grown, pool = growing(model, worlds=3, capacity=4096)
+    pool.volume.assign(1.7 * pool.volume.numpy())
+    grown.advance(0.2001, 0.001)
+    assert len(set(pool.counts)) == 1 and pool.counts[0] >= 128
+    frames = [pool.snapshot(world) for world in range(3)]
+    for name in frames[0]:
+        assert (frames[0][name] == frames[1][name]).all() and (frames[0][name] == frames[2][name]).all()
 
 
 def test_children_that_find_no_room_end_the_run():
