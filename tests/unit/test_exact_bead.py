@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fluidbench.measure.bead import Bead, layer_heights, measure_bead
+from fluidbench.measure.bead import Bead, laid_share, layer_heights, measure_bead
 from fluidbench.measure.deposit import Deposit
 from fluidbench.measure.slump import front, measure_slump, radial_heights, spread_radius
 
@@ -47,6 +47,8 @@ def test_each_section_is_taken_at_its_own_place_on_the_path():
     near = np.abs(made.station - 0.014) < 2 * D
     assert made.width[~near] == pytest.approx(np.where(made.station < 0.014, 8, 12)[~near] * D) and near.sum() == 4
     assert made.middle.width == made.width[7] > made.width[5]
+    begun = measure_bead(deposit, paste(), laid=0.5)  # the middle of what was laid
+    assert begun.middle.width == made.width[3] < begun.width[7] and begun.laid == 0.5 and made.laid == 1.0
 
 
 def test_sections_stand_square_to_the_leg_they_lie_on():
@@ -88,9 +90,9 @@ def test_no_bead_without_a_moving_nozzle():
     assert measure_bead(block(), paste(toolpath=fixed)) is None
 
 
-def by_hand(width, area):
-    station = np.linspace(0.0, 2.0, len(width))
-    return Bead(station, np.array(width, float), 10.0 * np.array(width, float), np.array(area, float), middle=None)
+def by_hand(width, area, laid=1.0):
+    station, width = np.linspace(0.0, 2.0, len(width)), np.array(width, float)
+    return Bead(station, width, 10.0 * width, np.array(area, float), middle=None, laid=laid)
 
 
 @pytest.mark.parametrize("count", [11, 201])
@@ -101,6 +103,29 @@ def test_averages_run_over_the_middle_three_fifths(count):
     summary = made.summary(3)
     assert summary["bead_width_m"] == pytest.approx(4.0) and summary["bead_height_m"] == pytest.approx(40.0)
     assert summary["bead_area_m2"] == pytest.approx(3.0 / 3)
+
+
+def test_averages_run_over_the_middle_of_what_was_laid():
+    """Of half of the path: stations from a tenth to four tenths of it; of next to nothing: nothing."""
+    share = np.arange(201) / 200
+    inner = (share > 0.099) & (share < 0.401)
+    values = np.where(inner, 8.0 * share, 1e3)
+    summary = by_hand(values, values, laid=0.5).summary(1)
+    assert summary["bead_width_m"] == pytest.approx(2.0) and summary["bead_area_m2"] == pytest.approx(2.0)
+    assert by_hand(values, values, laid=0.004).summary(1) == {}
+
+
+def test_the_share_that_was_laid_follows_from_the_last_release():
+    """10 mm of 31 at 0.1 m/s after 0.1 s, and a disc of 2 mm, both of the path and of the column, that may be early."""
+    births = np.array([0.05, 0.1, 0.02])
+    assert laid_share(births, paste()) == pytest.approx((0.01 + 0.004) / 0.031)
+    assert laid_share(np.array([0.28]), paste()) == 1.0 and laid_share(np.array([]), paste()) == 1.0
+    slow = paste(nozzle={"diameter": 0.012, "exit_speed": 0.05, "standoff": 0.01})
+    assert laid_share(births, slow) == pytest.approx((0.01 + 0.006) / 0.031)
+    wall = {**LINE, "kind": "wall", "layers": 2, "layer_height": 0.005, "pause": 0.2}
+    assert laid_share(np.array([0.6]), paste(toolpath=wall)) == 1.0  # whatever of the second layer
+    fixed = {"kind": "line", "start": [0.0, 0.0], "speed": 0.0, "dwell": 1.0}
+    assert laid_share(births, paste(toolpath=fixed)) == 1.0 == laid_share(births, scenario())
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,14 @@ def test_the_top_lies_where_half_of_the_space_is_filled():
     assert STEPS.top(x=1.0) == STEPS.top(y=2.0, within=0.1) == STEPS.top()  # an axis needs both
 
 
+def test_the_level_of_a_profile_and_the_column_of_a_point():
+    assert STEPS.level(np.array([1.0, 0.2, 0.7, 0.3])) == pytest.approx(3.0 + 2.5 * D)  # the last fall counts
+    assert STEPS.level(np.array([0.49, 0.2, 0.0, 0.0])) == -np.inf
+    assert STEPS.level(np.array([0.49, 0.2, 0.0, 0.0]), 7.0) == 7.0
+    for point, column in (((1.0, 2.0), (0, 0)), ((1.7, 2.3), (1, 1)), ((2.3, 1.7), (3, -1)), ((0.7, 2.2), (-1, 0))):
+        assert STEPS.place(np.array(point)).tolist() == list(column)
+
+
 def grid_deposit(function, n=48, spacing=0.1):
     """A field of n^3 cells whose values are a function of place; the box starts at (0, -2, 1)."""
     origin = np.array([0.0, -2.0, 1.0]) + spacing / 2
