@@ -113,6 +113,7 @@ def test_averages_run_over_the_middle_of_what_was_laid():
     summary = by_hand(values, values, laid=0.5).summary(1)
     assert summary["bead_width_m"] == pytest.approx(2.0) and summary["bead_area_m2"] == pytest.approx(2.0)
     assert by_hand(values, values, laid=0.004).summary(1) == {}
+    assert Bead(*[np.ones(3)] * 4, middle=None).laid == 1.0
 
 
 def test_the_share_that_was_laid_follows_from_the_last_release():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fluidbench.layout import emitted
 from fluidbench.measure.deposit import Deposit
 from fluidbench.measure.ledger import deposit_of, final_lengths, ledger, lengths
 from fluidbench.measure.profiles import (
@@ -16,6 +17,7 @@ from fluidbench.measure.profiles import (
     sine_amplitude,
     widest_diameter,
 )
+from fluidbench.measure.tower import family_spread, measure_tower, standing
 from fluidbench.particles import CARRIED, CLAMPED
 
 from ..conftest import bead, scenario
@@ -107,6 +109,9 @@ def test_the_ledger_leaves_out_what_is_in_the_nozzle():
     assert light["center_z_m"] == pytest.approx(0.12 / 5)
 
 
+RING = {"kind": "ring", "center": [0.02, 0.0], "radius": 0.01, "speed": 0.1, "layers": 3, "layer_height": 0.002}
+
+
 def printed(low, high, d=0.002):
     """A frame of full cells between two corners, and one particle left in the nozzle above."""
     axes = [np.arange(a + d / 2, b, d) for a, b in zip(low, high, strict=True)]
@@ -129,6 +134,7 @@ def test_lengths_come_from_the_free_particles_alone_and_count_from_the_floor():
     final = final_lengths(frame, s)
     assert row.items() <= final.items()
     assert final["bead_width_m"] == pytest.approx(0.02) and final["bead_height_m"] == pytest.approx(0.006)
+    assert not measure_tower(frame, bead(toolpath=RING, duration=2.5)).keys() & final.keys()
     assert "layer_2_height_m" not in final and "ring_drift_m" not in final and "family_spread_m" not in final
 
 
@@ -139,17 +145,25 @@ def test_lengths_of_bodies_are_those_of_slump_and_front():
 
 
 def test_layers_are_numbered_from_the_second_and_a_ring_may_drift():
-    path = {"kind": "ring", "center": [0.02, 0.0], "radius": 0.01, "speed": 0.1, "layers": 3, "layer_height": 0.002}
-    s = bead(toolpath=path, duration=2.5)
+    s = bead(toolpath=RING, duration=2.5)
     frame = printed((0.0, -0.02, 0.0), (0.04, 0.02, 0.012))
     low, high = frame["position"][:, 2] < 0.004, frame["position"][:, 2] > 0.008
     turn = s.toolpath.length() / 0.1 + 0.02
     frame["birth_time"] = np.where(low, 0.1, np.where(high, 2 * turn + 0.1, turn + 0.1))
     row = final_lengths(frame, s)
     assert row["layer_2_height_m"] == pytest.approx(0.004) and row["layer_3_height_m"] == pytest.approx(0.004)
+    tower, stands = measure_tower(frame, s), standing(deposit_of(frame, s), s)
+    assert tower and {key: row[key] for key in tower} == pytest.approx(tower, nan_ok=True)
+    assert stands and {key: lengths(frame, s)[key] for key in stands} == pytest.approx(stands, nan_ok=True)
     assert "layer_1_height_m" not in row and "layer_4_height_m" not in row
     assert row["ring_drift_m"] == pytest.approx(0.0, abs=1e-9)
     left = (frame["position"][:, 0] < 0.02) & (frame["held"] == 0)
     frame["mass"] = np.where(left, 3.0, 1.0)  # by mass: 3 * 0.01 + 1 * 0.03 over 4
     frame["position"][:, 1] += 0.003
     assert final_lengths(frame, s)["ring_drift_m"] == pytest.approx(np.hypot(0.005, 0.003), rel=1e-6)
+
+
+def test_foam_tells_how_far_its_families_have_spread():
+    s = bead(material={"density": 1000.0, "youngs_modulus": 1e3, "expansion": {"ratio": 4.0}})
+    frame = printed((-0.01, -0.01, 0.0), (0.04, 0.01, 0.008))
+    assert final_lengths(frame, s)["family_spread_m"] == pytest.approx(family_spread(frame, emitted(s)), nan_ok=True)

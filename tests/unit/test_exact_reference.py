@@ -37,6 +37,7 @@ def test_the_beads_section_is_what_is_fed_over_how_fast_it_is_laid():
     assert found.measured == 1.07 * area and found.measure == "relative" and found.source == "Q / V"
     thin = emission_answers(s, {"mass_kg": 0.0, "bead_area_m2": 0.9 * area}, 0.6)["bead area [m^2]"]
     assert thin.error == pytest.approx(0.1)
+    assert "bead area [m^2]" in emission_answers(s, {"mass_kg": 0.0, "bead_area_m2": area}, 0.6 * (1 - 1e-7))
     found, reasons = answers(s, pd.DataFrame({"time_s": [0.0, 0.59]}), {"mass_kg": 0.0, "bead_area_m2": area})
     assert [answer.quantity for answer in found] == ["emitted mass [kg]"]  # the path takes 0.6 s
     assert reasons == ["bead area against Q / V: the path takes 0.6 s, the run ends at 0.59 s"]
@@ -113,8 +114,17 @@ def test_other_slumps_are_compared_with_nothing(tau, more, words):
 
 
 def test_proportions_may_differ_by_what_a_lattice_does():
-    for radius in (0.0397, 0.0403):
-        assert len(slump_answers(0.2, 0.4, {**CYLINDER, "radius": radius})[0]) == 1
+    for radius, near in ((0.0397, True), (0.0403, True), (0.08 / 2.0205, False), (0.08 / 1.9795, False)):
+        assert len(slump_answers(0.2, 0.4, {**CYLINDER, "radius": radius})[0]) == near
+    for ratio, near in ((2.038, True), (1.962, True), (2.041, False), (1.959, False)):
+        assert len(front_answers([0.0, 5.0], [1.0, 4.0], ratio=ratio)[0]) == near
+
+
+def test_weak_gravity_will_do():
+    """tau' = 8 / (1000 * 0.5 * 0.08) = 0.2; and T runs slower."""
+    ((answer,), _) = slump_answers(0.01, 0.4, gravity=-0.5)
+    assert answer.reference == pytest.approx(0.325)
+    assert front_answer(5.0 * ROWS["T"], ROWS["Z"], gravity=-0.4).error == pytest.approx(0.0, abs=1e-9)
 
 
 def test_nothing_is_compared_with_what_was_not_asked_for():
