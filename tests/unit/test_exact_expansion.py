@@ -16,12 +16,12 @@ D = 0.01
 VELOCITY = [0.1, -0.2, 0.3]
 
 
-def growing(model, side=4, center=(0.1, 0.1, 0.1), generations=3, capacity=20_000, worlds=1, seed=0, **fields):
+def growing(model, side=4, center=(0.05, 0.1, 0.1), generations=3, capacity=20_000, worlds=1, seed=0, **fields):
     """A cube of side^3 particles of 1 cm^3 each, and what makes them grow."""
     body = {"kind": "box", "center": list(center), "size": [D * side] * 3, "velocity": VELOCITY}
     material = {"density": 1000.0, "youngs_modulus": 1e3, "expansion": model}
     walls = {"x_lower": "periodic", "x_upper": "periodic"}
-    domain = {"lower": [0.0] * 3, "upper": [0.2, 0.3, 0.4], "walls": walls}
+    domain = {"lower": [-0.05, 0.0, 0.0], "upper": [0.15, 0.3, 0.4], "walls": walls}
     s = scenario(bodies=[body], material=material, domain=domain, spacing=D, seed=seed)
     pool = Pool(Scene([s] * worlds), capacity)
     grown = Growing(pool.scene, pool, side**3, generations)
@@ -94,6 +94,8 @@ def test_what_has_outgrown_the_spacing_is_halved_in_place():
     before = {name: array.numpy()[:64].copy() for name, array in pool.fields.items()}
     grown.advance(0.1, 0.001)
     assert pool.counts == [72, 64]
+    for first, count in ((0, 72), (pool.capacity, 64)):  # what is not in use stays as it was
+        assert not pool.mass.numpy()[first + count : first + pool.capacity].any()
     after = {name: array.numpy()[:72].copy() for name, array in pool.fields.items()}
     halved = [0, 1, 2, 3, 4, 5, 6, 8]
     same = [i for i in range(64) if i not in halved]
@@ -133,7 +135,7 @@ def families(pool, ancestors):
 
 def test_a_litter_shares_mass_and_volume_in_a_ball_about_its_parent():
     """8 children of 1 cm^3 in a ball of 0.7 edges of 8 cm^3, 1.4 cm; less their mean, 7/8 of 3/5 r^2."""
-    grown, pool = growing({**SPAWN, "radius": 0.7, "impulse": 0.5}, side=8, center=(0.1, 0.15, 0.2), generations=1)
+    grown, pool = growing({**SPAWN, "radius": 0.7, "impulse": 0.5}, side=8, center=(0.05, 0.15, 0.2), generations=1)
     parents = pool.position.numpy()[:512].astype(float)
     grown.advance(0.1999, 0.001)
     assert pool.counts == [512]
@@ -144,6 +146,7 @@ def test_a_litter_shares_mass_and_volume_in_a_ball_about_its_parent():
     assert position[family].mean(axis=1) == pytest.approx(parents, abs=1e-7)
     out = position[family] - parents[:, None]
     assert np.mean(out**2) == pytest.approx(0.014**2 * 3 / 5 * 7 / 8 / 3, rel=0.02)
+    assert np.mean(out**2, axis=(0, 1)) == pytest.approx(np.full(3, np.mean(out**2)), rel=0.05)  # in all directions
     assert np.linalg.norm(out - out[:, :1], axis=2).max() <= 0.028
     assert velocity[family] - VELOCITY == pytest.approx(0.5 / 0.014 * out, abs=1e-5)  # 0.5 m/s at the rim
     assert pool.mass.numpy()[family] == pytest.approx(np.full((512, 8), 1000.0 * D**3 / 8))
@@ -174,12 +177,15 @@ def test_children_that_find_no_room_end_the_run():
 
 
 def test_noise_has_its_size_in_every_direction_and_no_mean():
-    grown, pool = growing({**SPAWN, "noise": 0.3}, side=8, center=(0.1, 0.15, 0.2))
+    grown, pool = growing({**SPAWN, "noise": 0.3}, side=8, center=(0.05, 0.15, 0.2))
     grown.advance(0.2001, 0.001)
     noise = pool.velocity.numpy()[families(pool, 512)].astype(float) - VELOCITY
     assert noise.mean(axis=1) == pytest.approx(np.zeros((512, 3)), abs=1e-7)
     assert np.square(noise).mean(axis=(0, 1)) == pytest.approx(np.full(3, 0.09 / 3 * 7 / 8), rel=0.05)
     assert np.linalg.norm(noise[:, 0] - noise[:, 1], axis=1).max() <= 0.6 + 1e-6
+    position = pool.position.numpy()[families(pool, 512)].astype(float)
+    out = position - position.mean(axis=1, keepdims=True)
+    assert abs(np.sum(noise * out)) < 0.05 * np.linalg.norm(noise) * np.linalg.norm(out)  # wherever they lie
 
 
 def test_passes_come_at_their_interval_and_no_more_than_there_are():
@@ -205,10 +211,15 @@ def test_passes_come_at_their_interval_and_no_more_than_there_are():
 def test_chance_decides_the_fraction_and_a_family_keeps_one_clock():
     """Two and a half children each: two or three. With jitter, at 0.4 s of 0.2 +- 0.1 and an interval of 0.2, half of
     the ancestors have had both passes and the others one: a family is of one size or of the square of it."""
-    grown, pool = growing({**SPAWN, "ratio": 2.5}, side=16, center=(0.1, 0.15, 0.2))
+    grown, pool = growing({**SPAWN, "ratio": 2.5}, side=16, center=(0.05, 0.15, 0.2))
     grown.advance(0.2001, 0.001)
     sizes = np.bincount(pool.origin.numpy()[: pool.counts[0]] % 4096)
     assert set(sizes) == {2, 3} and sizes.mean() == pytest.approx(2.5, abs=0.03)
+    again, twice = growing({**SPAWN, "ratio": 6.25, "passes": 2}, side=8, center=(0.05, 0.15, 0.2), generations=2)
+    for now in (0.21, 0.31):
+        again.advance(now, 0.001)
+    origin = twice.origin.numpy()[: twice.counts[0]]
+    assert len(np.unique(origin)) == len(origin) > 512 * 6
     volume = np.bincount(pool.origin.numpy()[: pool.counts[0]] % 4096, pool.volume.numpy()[: pool.counts[0]])
     assert volume == pytest.approx(np.full(4096, 2.5 * D**3))
     model = {**SPAWN, "ratio": 4.0, "passes": 2, "interval": 0.2, "jitter": 0.1}
@@ -222,10 +233,18 @@ def test_chance_decides_the_fraction_and_a_family_keeps_one_clock():
     assert (sizes == 4).mean() == pytest.approx(0.5, abs=0.06)
 
 
+def test_parents_of_one_child_still_grow():
+    """A ratio of 1.001: seed 0 gives none of 64 a second child."""
+    grown, pool = growing({**SPAWN, "ratio": 1.001})
+    grown.advance(0.21, 0.001)
+    assert pool.counts == [64] and (pool.generation.numpy()[:64] == 1).all()
+    assert pool.volume.numpy()[:64] == pytest.approx(np.full(64, 1.001 * D**3), rel=1e-6)
+
+
 def test_children_stay_inside_the_walls_and_come_back_at_periodic_ones():
     """At least half a spacing above the floor when spawned, a quarter from other walls and when halved."""
-    low = np.full((64, 3), 0.1 * D)
-    low[32:] = [0.2 - 0.1 * D, 0.3 - 0.1 * D, 0.4 - 0.1 * D]
+    low = np.full((64, 3), 0.1 * D) - [0.05, 0.0, 0.0]
+    low[32:] = [0.15 - 0.1 * D, 0.3 - 0.1 * D, 0.4 - 0.1 * D]
     for model, floor, extra in (({**SPAWN, "margin": 0.6}, 0.6, {}),
                                 ({"ratio": 9.0}, 0.25, {"volume": np.full(64, 8 * D**3)})):  # fmt: skip
         grown, pool = growing(model, position=low, **extra)
@@ -236,7 +255,7 @@ def test_children_stay_inside_the_walls_and_come_back_at_periodic_ones():
         assert position[:, 2].max() == pytest.approx(40 - 0.25, abs=1e-4)
         assert position[:, 1].min() == pytest.approx(0.25, abs=1e-4)
         assert position[:, 1].max() == pytest.approx(30 - 0.25, abs=1e-4)
-        x = position[:, 0]
+        x = position[:, 0] + 5
         assert 0 <= x.min() < 0.25 and 20 - 0.25 < x.max() <= 20 and ((x < 4) | (x > 16)).all()
         from_low = pool.origin.numpy()[: pool.counts[0]] % 64 < 32
         assert (x[from_low] > 16).any() and (x[from_low] < 4).any()
