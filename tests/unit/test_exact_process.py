@@ -270,3 +270,12 @@ def test_chance_is_even_and_depends_on_everything_that_it_is_asked_for():
     assert way.T @ way / len(n) == pytest.approx(np.eye(3) / 3, abs=0.01)
     for axis in range(3):  # each component of a direction on the sphere is even in -1 .. 1
         assert np.histogram(way[:, axis], 8, (-1, 1))[0] == pytest.approx(np.full(8, 5000), abs=300)
+
+
+def test_curing_draws_its_own_lots():
+    """Those of its purpose for each particle, early for a high lot: not those of the expansion, or both would go
+    together."""
+    due, _ = curing(8.0, np.full(4096, 6.5), jitter=0.1, kind="linear", time=2.0)
+    level = 50.0 * (0.5 + 0.1 * (2.0 * drawn(np.arange(4096), purpose="curing")[0] - 1.0)) + 0.5
+    clear = np.abs(level - np.rint(level)) > 1e-3
+    assert (due == np.floor(level))[clear].all() and clear.mean() > 0.99
