@@ -57,7 +57,7 @@ def measure_bead(deposit: Deposit, scenario: Scenario, laid: float = 1.0) -> Bea
     station = np.linspace(0.0, knots[-1], count)
     leg = np.clip(np.searchsorted(knots, station, side="right") - 1, 0, len(legs) - 1)
     points = np.stack([np.interp(station, knots, corners[:, i]) for i in range(2)], axis=1)
-    height = deposit.origin[2] + deposit.fill.shape[2] * deposit.spacing - scenario.domain.lower[2]
+    height = deposit.origin[2] + (deposit.fill.shape[2] - 0.5) * deposit.spacing - scenario.domain.lower[2]
     expansion = scenario.material.expansion
     reach = 2.5 * nozzle.diameter * (1.0 if expansion is None else expansion.ratio ** (1 / 3))
     if path.kind == "ring" and path.radius is not None:

@@ -60,11 +60,13 @@ def quicken(
             end = wp.max(now + tick - start, 0.0)
             begin = wp.max(now - start, 0.0)
             left, after = wp.exp(-begin / time), wp.exp(-end / time)
-            gain = (ratio - 1.0) * (left - after) / (1.0 + (ratio - 1.0) * (1.0 - left))
+            step = (end - begin) / time
+            gained = left - after
+            if step < 0.01:  # float32 would cancel, here and below
+                gained = left * step * (1.0 - 0.5 * step)
+            gain = (ratio - 1.0) * gained / (1.0 + (ratio - 1.0) * (1.0 - left))
             rate = wp.log(1.0 + gain) / tick
-            if gain < 1.0e-3:  # float32 would cancel
-                step = (end - begin) / time
-                gain = (ratio - 1.0) * left * step * (1.0 - 0.5 * step) / (1.0 + (ratio - 1.0) * (1.0 - left))
+            if gain < 1.0e-3:
                 rate = gain * (1.0 - 0.5 * gain) / tick
         growth[i] = rate
 

@@ -32,6 +32,7 @@ from .execute import Finished, Hooks, execute
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
 ENOUGH = 3  # spacings needed for an extrapolation
+NOISE = 0.01  # share of a length that its scatter may have without casting doubt on a fit
 FALLS = 0.5  # observed order from which an error counts as falling
 
 
@@ -74,6 +75,7 @@ class Selection:
     limits: dict[str, dict[str, float]]
     runs: list[Finished]
     notes: list[str] = field(default_factory=list)
+    erratic: set[str] = field(default_factory=set)  # methods with a length that no line through its spacings explains
 
     def missing(self) -> list[str]:
         """Runs that it wanted and has nothing of; that a method refuses is an answer."""
@@ -92,7 +94,7 @@ class Selection:
         if len(own) < ENOUGH:
             return False
         falling = own[0].discretisation <= own[1].discretisation * (1.0 + 1e-9)
-        return falling and (own[0].discretisation == 0 or self.order(method) > FALLS)
+        return falling and method not in self.erratic and (own[0].discretisation == 0 or self.order(method) > FALLS)
 
     def front(self) -> list[Candidate]:
         """The candidates that none beats in both cost and error, cheapest first."""
@@ -174,6 +176,8 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Finished])
             continue
         fits[method] = {key: extrapolate(own, key) for key in lengths_of(own[0].record)}
         result.limits[method] = {key: fit.limit for key, fit in fits[method].items()}
+        if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0])):
+            result.erratic.add(method)
     consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
     if not trusted:
         result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
@@ -201,7 +205,15 @@ class Fit:
     """A length as limit + slope d: its limit at zero spacing, and its distance from the fit at each spacing."""
 
     limit: float
+    slope: float
     residual: dict[float, float]
+
+    @property
+    def explains(self) -> bool:
+        """Whether the line says more of the length than chance: its distances from it are small beside what it rises
+        over the spacings, or beside the length itself."""
+        rise = abs(self.slope) * (max(self.residual) - min(self.residual))
+        return max(self.residual.values()) <= max(0.5 * rise, NOISE * abs(self.limit))
 
     def scatter(self, spacing: float) -> float:
         """The largest distance from the fit at this spacing and finer ones."""
@@ -214,7 +226,7 @@ def extrapolate(runs: Sequence[Finished], key: str) -> Fit:
     q = np.array([lengths_of(r.record)[key] for r in runs])
     slope, limit = np.polyfit(d, q, 1, w=1.0 / d)
     residual = np.abs(q - (slope * d + limit))
-    return Fit(float(limit), dict(zip(d.tolist(), residual.tolist(), strict=True)))
+    return Fit(float(limit), float(slope), dict(zip(d.tolist(), residual.tolist(), strict=True)))
 
 
 def exact_lengths(run: Finished) -> dict[str, float]:

@@ -310,7 +310,7 @@ def test_confidence_needs_a_second_witness_that_converges(monkeypatch):
     assert sure(runs("mpm", 0.010), runs("sph", 0.0102), tolerance=0.01).startswith("medium")
     assert sure(runs("mpm", 0.010)).startswith("low: only mpm")
     assert any("no second witness" in note for note in assess(load("line_bead"), ["mpm"], runs("mpm", 0.010)).notes)
-    wild = [record("sph", d, w) for d, w in ((1.0, 0.0108), (1.5, 0.0094), (2.0, 0.0100))]
+    wild = [record("sph", d, w) for d, w in ((1.0, 0.0128), (1.5, 0.0091), (2.0, 0.0135))]
     assert sure(runs("mpm", 0.010), wild, tolerance=9.0).startswith("low") and "not converged" in sure(
         runs("mpm", 0.010), wild, tolerance=9.0
     )

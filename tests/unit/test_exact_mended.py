@@ -1,4 +1,4 @@
-"""What is right where the code of today is wrong: to be merged with its repair."""
+"""What was wrong once, and planted errors brought to light."""
 
 import math
 
