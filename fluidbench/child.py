@@ -48,11 +48,8 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         from .report.film import Film
 
         simulation.film = Film(folder / "film", job.scenario, job.film_every)
-    try:
-        outcome = simulation.run(observe, job.wall_limit, checkpoints)
-    finally:
-        if simulation.film is not None:
-            simulation.film.close()
+    outcome = simulation.run(observe, job.wall_limit, checkpoints)
+    undrawn = [] if simulation.film is None else [text for text in [simulation.film.close()] if text]
     frame = simulation.frame()
     series = pd.DataFrame(rows)
     write_parquet(folder / "series.parquet", series)
@@ -77,7 +74,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         "bounds_s": {b.name: b.dt for b in simulation.bounds()},
         "binding_s": outcome.binding,
         "approximations": approximations(solver, scenario, simulation.config),
-        "warnings": scenario.warnings(),
+        "warnings": scenario.warnings() + undrawn,
         "config": simulation.config.model_dump(), "input": scenario.model_dump(mode="json"),
         "code": made_by, "machine": about, "film_every": job.film_every, "resumed": checkpoints.resumed,
     }  # fmt: skip

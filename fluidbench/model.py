@@ -61,7 +61,7 @@ class Model(BaseModel):
 
     def replace(self, **changes: Any) -> Self:
         """The same with some values changed, validated like any other; raises pydantic's ValidationError."""
-        return type(self).model_validate(dict(self) | changes)
+        return type(self).model_validate({name: getattr(self, name) for name in type(self).model_fields} | changes)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy, not validated; what is derived from values (cached properties) is derived anew."""

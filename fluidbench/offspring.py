@@ -3,6 +3,7 @@
 import os
 import sys
 import sysconfig
+import threading
 from pathlib import Path
 
 NOISE = (
@@ -38,3 +39,13 @@ def command(module: str, *arguments: str) -> list[str]:
     """The command line that runs a module of ours in a process of its own."""
     path = search_path()
     return [sys.executable, "-P", "-c", START, os.pathsep, os.pathsep.join(path), module, *arguments]
+
+
+def end_with_parent() -> None:
+    """Leave as soon as the parent is gone: its end of our standard input closes, however it ended."""
+
+    def wait() -> None:
+        sys.stdin.read()
+        os._exit(3)
+
+    threading.Thread(target=wait, daemon=True).start()

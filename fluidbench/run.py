@@ -6,7 +6,6 @@ from the folder and leaves record.json there.
 """
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import Interrupted, Obstacle, UserError
-from .offspring import command, environment
+from .offspring import command, end_with_parent, environment
 from .store import key_of, make_way, write_atomically, write_record
 from .target import HERE, Target
 
@@ -186,23 +185,13 @@ def _cause(job: Job, folder: Path, code: int, timed: bool, starved: bool) -> str
     return f"its process ended with code {code}: {last}" if code else f"its process left no whole record: {last}"
 
 
-def _end_with_parent() -> None:
-    """Leave as soon as the parent is gone: its end of our standard input closes."""
-
-    def wait() -> None:
-        sys.stdin.read()
-        os._exit(3)
-
-    threading.Thread(target=wait, daemon=True).start()
-
-
 def main(arguments: list[str]) -> None:
     """The child's entry point."""
     from .child import perform
 
     folder = Path(arguments[0])
     if ATTENDED in arguments[1:]:
-        _end_with_parent()
+        end_with_parent()
     table = json.loads((folder / "job.json").read_text())
     job = Job(**table | {"target": Target(**table["target"])})
 

@@ -4,6 +4,7 @@ The run only writes arrays to disk; drawing takes as long as it takes, beside it
 FOLDER FIRST EVERY` is such a process: it draws frames FIRST, FIRST + EVERY, ... until the run has ended.
 """
 
+import io
 import json
 import os
 import subprocess
@@ -14,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..offspring import command, environment
+from ..offspring import command, end_with_parent, environment
+from ..store import write_atomically
 
 ENDED = "ended"
 PATIENCE = 600.0  # longest wait for the last pictures after a run has ended [s]
@@ -22,17 +24,26 @@ DRAWERS = max(1, min(4, (os.cpu_count() or 1) - 1))  # one core is the run's
 
 
 class Film:
-    """Takes a frame every `every` simulated seconds; `close` waits for the drawing processes."""
+    """Takes a frame every `every` simulated seconds; `close` waits for the drawing processes, which end with this one,
+    however it ends."""
 
     def __init__(self, folder: Path, scenario: dict[str, Any], every: float) -> None:
-        self.folder, self.every, self.next, self.shots = folder, every, 0.0, 0
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / ENDED).unlink(missing_ok=True)
-        (folder / "scenario.json").write_text(json.dumps(scenario))
-        with (folder / "log.txt").open("w") as log:
+        self.folder, self.scenario, self.every, self.next, self.shots = folder, scenario, every, 0.0, 0
+        self.drawers: list[subprocess.Popen] = []
+
+    def _begin(self) -> None:
+        """Start the drawing processes, at the first frame or, where a run goes on, at its next one."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        for old in [self.folder / ENDED, *self.folder.glob("frame_*.*")]:
+            if old.name == ENDED or int(old.stem.partition("_")[2]) >= self.shots:
+                old.unlink(missing_ok=True)
+        write_atomically(self.folder / "scenario.json", json.dumps(self.scenario))
+        with (self.folder / "log.txt").open("w") as log:
             self.drawers = [
-                subprocess.Popen(command(__name__, str(folder), str(i), str(DRAWERS)), env=environment(),
-                                 stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+                subprocess.Popen(
+                    command(__name__, str(self.folder), str(i), str(DRAWERS), str(self.shots)), env=environment(),
+                    stdin=subprocess.PIPE, stdout=log, stderr=log,
+                )
                 for i in range(DRAWERS)
             ]  # fmt: skip
 
@@ -41,26 +52,37 @@ class Film:
 
     def shoot(self, sim: Any) -> None:
         """Copy positions and births to disk; drawing happens elsewhere."""
+        if not self.drawers:
+            self._begin()
         pool = sim.pool
         n = pool.counts[0]
-        part = self.folder / f"frame_{self.shots:05d}.part"
-        with part.open("wb") as file:
-            np.savez(
-                file, time=sim.now, position=pool.position[:n].numpy(), birth_time=pool.birth_time[:n].numpy(),
-                phase=pool.phase[:n].numpy(),
-            )  # fmt: skip
-        part.rename(part.with_suffix(".npz"))
+        buffer = io.BytesIO()
+        np.savez(
+            buffer, time=sim.now, position=pool.position[:n].numpy(), birth_time=pool.birth_time[:n].numpy(),
+            phase=pool.phase[:n].numpy(),
+        )  # fmt: skip
+        write_atomically(self.folder / f"frame_{self.shots:05d}.npz", buffer.getvalue())
         self.shots += 1
         self.next += self.every
 
-    def close(self) -> None:
-        (self.folder / ENDED).touch()
+    def close(self) -> str:
+        """Wait for the last pictures; says which are missing, if any."""
+        if self.drawers:
+            (self.folder / ENDED).touch()
+        deadline = time.monotonic() + PATIENCE
         for drawer in self.drawers:
-            drawer.wait(timeout=PATIENCE)
+            try:
+                drawer.wait(timeout=max(deadline - time.monotonic(), 0.1))
+            except subprocess.TimeoutExpired:
+                drawer.kill()
+                drawer.wait()
+        missing = sum(not (self.folder / f"frame_{i:05d}.png").is_file() for i in range(self.shots))
+        return f"{missing} of {self.shots} pictures were not drawn: see film/log.txt" if missing else ""
 
 
-def draw_all(folder: Path, first: int, every: int) -> None:
-    """Draw each `every`-th frame from the `first` on as it appears, as frame_00000.png and so on."""
+def draw_all(folder: Path, first: int, every: int, known: int) -> None:
+    """Draw each `every`-th frame from the `first` on as it appears, as frame_00000.png and so on; of the `known` ones
+    that a run that goes on has taken before, those that are still there."""
     from fluidbench.scenario import Scenario
 
     scenario = Scenario.model_validate(json.loads((folder / "scenario.json").read_text()))
@@ -72,6 +94,8 @@ def draw_all(folder: Path, first: int, every: int) -> None:
             with np.load(path) as data:
                 canvas.draw({key: data[key] for key in data.files}, path.with_suffix(".png"))
             path.unlink()
+            shot += every
+        elif shot < known:
             shot += every
         elif ended:
             return
@@ -107,8 +131,11 @@ class _Canvas:
         for down, across in ((a, b) for a in reach for b in reach if a * a + b * b <= self.brush**2):
             inside = np.clip(row + down, 0, self.shape[0] - 1), np.clip(column + across, 0, self.shape[1] - 1)
             image[inside] = colours
-        imsave(path, np.clip(image, 0.0, 1.0))
+        buffer = io.BytesIO()
+        imsave(buffer, np.clip(image, 0.0, 1.0), format="png")
+        write_atomically(path, buffer.getvalue())
 
 
 if __name__ == "__main__":
-    draw_all(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+    end_with_parent()
+    draw_all(Path(sys.argv[1]), *map(int, sys.argv[2:5]))

@@ -118,6 +118,24 @@ def test_a_child_that_is_killed_is_called_what_it_was(tmp_path):
     assert "wall-limit" not in out and "SIGKILL" in out
 
 
+def test_film_drawers_end_with_their_run_however_it_ends(tmp_path):
+    command = ["run", "line_bead", *TINY, "--set", "duration=3.0", "--solver", "pbd", "--render-every", "0.01"]
+    process = start(*command, "--out", str(tmp_path))
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob("runs/*/film/*.png")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    found = subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=False).stdout
+    child = int(found.split()[0])
+    drawers = subprocess.run(["pgrep", "-P", str(child)], capture_output=True, text=True, check=False).stdout.split()
+    assert drawers
+    os.kill(child, signal.SIGKILL)
+    process.communicate(timeout=60)
+    deadline = time.monotonic() + 10
+    while any(os.path.exists(f"/proc/{pid}") for pid in drawers) and time.monotonic() < deadline:  # noqa: PTH110
+        time.sleep(0.05)
+    assert not [pid for pid in drawers if os.path.exists(f"/proc/{pid}")]  # noqa: PTH110
+
+
 def test_two_studies_in_one_folder_make_each_run_once(tmp_path):
     command = ["compare", "line_bead", *TINY, "--solvers", "mpm,pbd", "--out", str(tmp_path)]
     both = [start(*command), start(*command)]
