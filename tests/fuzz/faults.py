@@ -99,7 +99,7 @@ class Child:
         Child.started += 1
         said, self.returncode, self.pid = io.StringIO(), 0, os.getpid()
         try:
-            with patch.object(run, "_end_with_parent", lambda: None), contextlib.redirect_stdout(said):
+            with contextlib.redirect_stdout(said):
                 run.main([command[-2]])
         except SystemExit as end:
             self.returncode = end.code if isinstance(end.code, int) else int(end.code is not None)
