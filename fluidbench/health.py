@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 from .particles import FAULT_ASTRAY, FAULT_STATE, Pool
-from .scene import Box, Force, Scene, force_potential, out_of_reach
+from .scene import Box, Force, Scene, force_potential
 
 wp.set_module_options({"enable_backward": False})
 ENERGY_FACTOR = 2.0  # kinetic energy beyond this many times what was ever supplied comes from the method
@@ -52,45 +52,61 @@ def inspect(
         wp.atomic_add(energy, world, 1, potential)
 
 
+NUMBERS, WHOLE, PLACES = wp.constant(0), wp.constant(1), wp.constant(2)  # what a field holds
+
+
+@wp.struct
+class Fields:
+    """Every field of a pool, as memory: what an audit needs to know of it."""
+
+    address: wp.array(dtype=wp.uint64)
+    holds: wp.array(dtype=int)
+    width: wp.array(dtype=int)  # numbers a particle
+    low: wp.array(dtype=float)
+    high: wp.array(dtype=float)
+
+
 @wp.kernel
-def audit_values(
-    values: wp.array(dtype=float), width: int, low: float, high: float, capacity: int, count: wp.array(dtype=int),
+def audit(
+    lanes: int, fields: Fields, box: Box, capacity: int, count: wp.array(dtype=int),
     # outputs
     fault: wp.array(dtype=int),
 ):  # fmt: skip
-    """Mark a field of which any number, of `width` a particle, lies outside low .. high or is none."""
-    i = wp.tid()
-    if i % capacity < count[i / capacity]:
-        for k in range(width):
-            x = values[i * width + k]
+    """Mark the pool where any number of any field lies outside its range or is none.
+
+    Positions and whole numbers become addresses in the passes: what is broken among them is replaced, by the middle of
+    the domain and by the least value.
+    """
+    field, world, lane = wp.tid()
+    width = int(fields.width[field])
+    low = float(fields.low[field])
+    high = float(fields.high[field])
+    i = (world * capacity) * width + lane
+    end = (world * capacity + count[world]) * width
+    broken = bool(False)
+    if fields.holds[field] == WHOLE:
+        numbers = wp.array(ptr=fields.address[field], shape=(end,), dtype=wp.int32)
+        while i < end:
+            if numbers[i] < int(low) or numbers[i] > int(high):
+                broken = True
+                numbers[i] = int(low)
+            i += lanes
+    else:
+        values = wp.array(ptr=fields.address[field], shape=(end,), dtype=wp.float32)
+        places = fields.holds[field] == PLACES
+        while i < end:
+            x = values[i]
+            if places:
+                k = i % 3
+                low = box.lower[k] - box.reach[k]
+                high = box.upper[k] + box.reach[k]
             if not (x >= low and x <= high):
-                wp.atomic_or(fault, 0, FAULT_STATE)
-
-
-@wp.kernel
-def audit_integers(
-    low: int, high: int, capacity: int, count: wp.array(dtype=int),
-    # outputs
-    values: wp.array(dtype=int), fault: wp.array(dtype=int),
-):  # fmt: skip
-    """The same for whole numbers; what is broken becomes `low`, lest it be used as an address."""
-    i = wp.tid()
-    if i % capacity < count[i / capacity] and (values[i] < low or values[i] > high):
-        wp.atomic_or(fault, 0, FAULT_STATE)
-        values[i] = low
-
-
-@wp.kernel
-def audit_positions(
-    box: Box, capacity: int, count: wp.array(dtype=int),
-    # outputs
-    position: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
-):  # fmt: skip
-    """Mark particles that are nowhere, and put them in the middle: positions become addresses in the passes."""
-    i = wp.tid()
-    if i % capacity < count[i / capacity] and out_of_reach(position[i], box.lower, box.upper, box.reach):
-        wp.atomic_or(fault, 0, FAULT_ASTRAY)
-        position[i] = 0.5 * (box.lower + box.upper)
+                broken = True
+                if places:
+                    values[i] = 0.5 * (low + high)
+            i += lanes
+    if broken:
+        wp.atomic_or(fault, 0, wp.where(fields.holds[field] == PLACES, FAULT_ASTRAY, FAULT_STATE))
 
 
 @dataclass(frozen=True)
@@ -127,25 +143,34 @@ class Health:
     def audit(self) -> None:
         """Enqueue the test of every field of the pool against its range; it marks the pool's fault bits."""
         if self._audit is None:
-            with wp.ScopedCapture(device=self.scene.device) as capture:
-                self._launch_audit()
+            pool, scene, self._fields = self.pool, self.scene, self._described()
+            with wp.ScopedCapture(device=scene.device) as capture:  # replayed: arguments cost more than the test itself
+                wp.launch(
+                    audit,
+                    (len(pool.fields), pool.worlds, self.lanes),
+                    [self.lanes, self._fields, scene.box, pool.capacity, pool.count],
+                    [pool.fault],
+                    device=scene.device,
+                )
             self._audit = capture.graph
         wp.capture_launch(self._audit)
 
-    def _launch_audit(self) -> None:
-        pool, device = self.pool, self.scene.device
-        active = [pool.capacity, pool.count]
-        for name, array in pool.fields.items():
-            low, high = pool.ranges[name]
-            if name == "position":
-                wp.launch(audit_positions, pool.size, [self.scene.box, *active], [array, pool.fault], device=device)
-            elif array.dtype is wp.int32:
-                bounds = [int(max(low, -(2**31))), int(min(high, 2**31 - 1))]
-                wp.launch(audit_integers, pool.size, [*bounds, *active], [array, pool.fault], device=device)
-            else:
-                width = wp.types.type_size_in_bytes(array.dtype) // 4
-                flat = wp.array(ptr=array.ptr, dtype=float, shape=width * pool.size, device=device)
-                wp.launch(audit_values, pool.size, [flat, width, low, high, *active], [pool.fault], device=device)
+    def _described(self) -> Fields:
+        """The pool's fields, all of which have been added by now."""
+        fields, pool = Fields(), self.pool
+        kinds = {name: WHOLE if array.dtype is wp.int32 else NUMBERS for name, array in pool.fields.items()}
+        kinds["position"] = PLACES
+        most = 2.0**31 - 256.0  # the largest float32 that is an int32
+        ranges = [(max(low, -most), min(high, most)) if kinds[name] == WHOLE else (low, high)
+                  for name, (low, high) in pool.ranges.items()]  # fmt: skip
+        with wp.ScopedDevice(self.scene.device):
+            fields.address = wp.array([array.ptr for array in pool.fields.values()], dtype=wp.uint64)
+            fields.holds = wp.array(list(kinds.values()), dtype=int)
+            sizes = [wp.types.type_size_in_bytes(array.dtype) // 4 for array in pool.fields.values()]
+            fields.width = wp.array(sizes, dtype=int)
+            fields.low = wp.array([low for low, _ in ranges], dtype=float)
+            fields.high = wp.array([high for _, high in ranges], dtype=float)
+        return fields
 
     def broken(self) -> str | None:
         """What a fault bit says of a run that has blown up; synchronises with the device."""

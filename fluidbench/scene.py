@@ -72,18 +72,9 @@ def force_potential(force: Force, x: wp.vec3):
 
 
 @wp.func
-def out_of_reach(free: wp.vec3, lower: wp.vec3, upper: wp.vec3, reach: wp.vec3):
-    """Whether a step leads, before any wall acts, to where no sound motion does; non-finite positions are nowhere."""
-    astray = bool(False)
-    for axis in range(3):
-        if not (free[axis] >= lower[axis] - reach[axis] and free[axis] <= upper[axis] + reach[axis]):
-            astray = True
-    return astray
-
-
-@wp.func
 def too_fast(v: wp.vec3, top_speed: float):
-    """Whether a velocity cannot come from the scenario, or is not finite."""
+    """Whether a velocity cannot come from the scenario, or is not finite: to be asked before walls act on the motion. A
+    step at any other speed, from a place in the domain, leads nowhere that a wall could hide."""
     return not (wp.length_sq(v) <= top_speed * top_speed)
 
 

@@ -83,6 +83,7 @@ class Simulation:
         self.tick, self.ticks, self.ticks_per_output = self.scenario.schedule
         self.speed = self.scenario.reference_speed
         self.done = 0
+        self.unseen = True  # whether somebody else may have changed the particles since the last audit
         self.film: Any = None  # takes pictures on the way: due(time), shoot(simulation)
         self._identity = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
         self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
@@ -111,7 +112,9 @@ class Simulation:
 
     def advance(self) -> Plan:
         """One tick: feed, plan, and run its substeps."""
-        self.health.audit()
+        if self.unseen or self.scene.device.is_cpu:  # on a GPU what nobody has looked at since the last audit is ours
+            self.health.audit()
+            self.unseen = False
         with self.process_launches:
             self._age()
         if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
@@ -150,7 +153,7 @@ class Simulation:
 
     def look(self) -> Vital:
         """Read the vital signs; synchronises with the device."""
-        vital = self.health.read()
+        vital, self.unseen = self.health.read(), True
         self.speed = max(vital.speed, 0.1 * self.scenario.reference_speed)
         return vital
 

@@ -106,17 +106,6 @@ def beyond(x, limit):
 
 
 @ti.func
-def out_of_reach(box, free):
-    """Whether a step leads, before any wall acts, to where no sound motion does."""
-    astray = False
-    for axis in ti.static(range(3)):
-        middle = 0.5 * (box.lower[axis] + box.upper[axis])
-        if beyond(free[axis] - middle, 0.5 * (box.upper[axis] - box.lower[axis]) + box.reach[axis]):
-            astray = True
-    return astray
-
-
-@ti.func
 def too_fast(v, top_speed):
     """Whether a velocity cannot come from the scenario."""
     return beyond(v.norm_sqr(), top_speed * top_speed)

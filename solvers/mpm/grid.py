@@ -36,8 +36,7 @@ class Grid:
     upper_friction: wp.vec3
     lower: wp.vec3  # walls [m]
     upper: wp.vec3
-    reach: wp.vec3  # as in scene.Box
-    top_speed: float
+    top_speed: float  # as in scene.Box
 
 
 def cells_of(domain: Domain, wanted: float) -> tuple[np.ndarray, np.ndarray]:
@@ -64,7 +63,7 @@ def grid_of(scene: Scene, wanted: float) -> Grid:
     grid.blocks_per_world = int(np.prod(blocks))
     for name in ("lower_kind", "upper_kind", "lower_friction", "upper_friction"):
         setattr(grid, name, getattr(scene.box, name))
-    for name in ("lower", "upper", "reach", "top_speed"):
+    for name in ("lower", "upper", "top_speed"):
         setattr(grid, name, getattr(scene.box, name))
     return grid
 

@@ -20,7 +20,6 @@ from ..taichi_bridge import (
     is_solid,
     ivec3,
     mat3,
-    out_of_reach,
     phase_at,
     struct_of,
     symmetric,
@@ -118,7 +117,7 @@ def g2p(
                 if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
                     volume_ratio[p] *= 1.0 - ti.min(h * feedback.rate * phase.wave_speed * crowding, 0.1)
             free = x + h * v
-            if out_of_reach(grid, free) or too_fast(v, grid.top_speed):
+            if too_fast(v, grid.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x = contained(grid, free)
             position[p] = x

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.particles import CARRIED, CLAMPED, FAULT_ASTRAY, FAULT_STATE, FREE
-from fluidbench.scene import Force, Phase, force_at, is_solid, out_of_reach, too_fast
+from fluidbench.scene import Force, Phase, force_at, is_solid, too_fast
 
 from .. import constitutive
 from ..bind import rebound, warp_func
@@ -309,7 +309,7 @@ def g2p(
             if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
                 volume_ratio[p] = j * (1.0 - wp.min(dt[world] * feedback.rate * phase.wave_speed * crowding, 0.1))
         free = x + dt[world] * v
-        if out_of_reach(free, grid.lower, grid.upper, grid.reach) or too_fast(v, grid.top_speed):
+        if too_fast(v, grid.top_speed):
             wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(grid, free)
         position[p] = x

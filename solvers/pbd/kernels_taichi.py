@@ -21,7 +21,6 @@ from ..taichi_bridge import (
     beyond,
     force_at,
     mat3,
-    out_of_reach,
     phase_at,
     rest_density,
     struct_of,
@@ -83,7 +82,7 @@ def predict(
             if held[i] == FREE:
                 v += dt[world] * force_at(force, world, position[i])
             free = position[i] + dt[world] * v
-            if out_of_reach(box, free) or too_fast(v, HURRIED * box.top_speed):
+            if too_fast(v, HURRIED * box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x, back = kept_inside(box, free, WALL_INSET * num.spacing)
             position[i], motion[i] = x, dt[world] * v + back
@@ -146,7 +145,7 @@ def apply(
             if shift.norm() > limit:
                 shift *= limit / shift.norm()
             free = position[i] + shift
-            if out_of_reach(box, free) or beyond(wanted, FARTHEST * num.spacing):
+            if beyond(wanted, FARTHEST * num.spacing):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x, back = kept_inside(box, free, WALL_INSET * num.spacing)
             position[i] = x

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE
-from fluidbench.scene import Box, Force, Phase, force_at, out_of_reach, too_fast
+from fluidbench.scene import Box, Force, Phase, force_at, too_fast
 
 from .. import constitutive
 from ..aging import rest_density
@@ -72,7 +72,7 @@ def predict(
         if held[i] == 0:
             v += h * force_at(force[world], position[i])
         free = position[i] + h * v
-        if out_of_reach(free, box.lower, box.upper, box.reach) or too_fast(v, HURRIED * box.top_speed):
+        if too_fast(v, HURRIED * box.top_speed):
             wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
         motion[i] = h * v + pushed(box, free, x)
@@ -163,7 +163,7 @@ def apply(
         if length > limit:
             shift = shift * (limit / length)
         free = position[i] + shift
-        if out_of_reach(free, box.lower, box.upper, box.reach) or not (length <= FARTHEST * num.spacing):
+        if not (length <= FARTHEST * num.spacing):
             wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
         motion[i] = motion[i] + shift + pushed(box, free, x)

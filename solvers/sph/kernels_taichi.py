@@ -33,7 +33,6 @@ from ..taichi_bridge import (
     force_at,
     is_solid,
     mat3,
-    out_of_reach,
     phase_at,
     rest_density,
     struct_of,
@@ -67,7 +66,7 @@ def move(
                 carried = 0.5 * rest * rest / phase.bulk_modulus * weight
             lift[i] = carried
             free = position[i] + h * v
-            if out_of_reach(box, free) or too_fast(v, box.top_speed):
+            if too_fast(v, box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x = contained(box, free, WALL_INSET * spacing)
             for axis in ti.static(range(3)):

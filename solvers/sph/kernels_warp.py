@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE
-from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid, out_of_reach, too_fast
+from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
 
 from .. import constitutive
 from ..aging import DISORDER, rest_density
@@ -348,7 +348,7 @@ def move(
             carried = stiffness * (force_at(force[world], position[i]) - acceleration[i])
         lift[i] = carried
         free = position[i] + h * v
-        if out_of_reach(free, box.lower, box.upper, box.reach) or too_fast(v, box.top_speed):
+        if too_fast(v, box.top_speed):
             wp.atomic_or(fault, 0, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * spacing)
         for axis in range(3):
