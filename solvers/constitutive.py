@@ -15,6 +15,8 @@ Every function is a plain law of floats (see bind.py): no solver, no array.
 
 from math import exp, pow, sqrt
 
+STRETCHED = 1.0e6  # volume ratio, or stretch squared, that no matter reaches; nor does it reach one over it [-]
+
 
 def pressure(compression: float, bulk_modulus: float, tait: float, tension_limit: float):
     """Pressure [Pa] at compression = rho / rho0 - 1.

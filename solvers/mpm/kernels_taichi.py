@@ -3,7 +3,7 @@
 import functools
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, CLAMPED, FAULT_ASTRAY, FAULT_STATE, FREE
+from fluidbench.particles import CARRIED, CLAMPED, FAULT_ASTRAY, FREE
 
 from ..flow_taichi import pressure, strained
 from ..smoothing import quadratic_spline
@@ -15,7 +15,6 @@ from ..taichi_bridge import (
     Phases,
     Quads,
     Vectors,
-    beyond,
     force_at,
     is_solid,
     ivec3,
@@ -51,7 +50,7 @@ from .grid_taichi import (
     slots_in_use,
     wrapped,
 )
-from .kernels_warp import ANCHOR, ANCHORED, CRUSHED, FAULT_STENCIL, STRETCHED, Feedback
+from .kernels_warp import ANCHOR, ANCHORED, FAULT_STENCIL, Feedback
 
 spline = taichi_func(quadratic_spline)
 FeedbackT = struct_of(Feedback)
@@ -161,17 +160,11 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
                 if held[p] == FREE:
                     a = inertia * c
                 if held[p] != CARRIED:
-                    growth = 1.0 + h * c.trace()
-                    j = volume_ratio[p] * ti.max(growth, CRUSHED)
-                    broken = growth < CRUSHED or beyond(growth, STRETCHED)
-                    broken = broken or j < 1.0 / STRETCHED or beyond(j, STRETCHED)
+                    j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
                     b, s = elastic_normal[p], elastic_shear[p]
                     if phase.shear_modulus > 0.0:
                         b, s = strained(phase, phase.shear_modulus, c, b, s, h)
                         elastic_normal[p], elastic_shear[p] = b, s
-                        broken = broken or beyond(b.sum(), STRETCHED) or b.sum() < 1.0
-                    if broken:
-                        ti.atomic_or(fault[0], FAULT_STATE)
                     volume_ratio[p] = j
                     tau = kirchhoff(phase, j, b, s, c)
                     for i, axis in ti.static(ti.ndrange(3, 3)):

@@ -17,6 +17,7 @@ from fluidbench.timestep import Bound, damped_limit
 
 from .. import aging
 from ..backends import backend_of
+from ..constitutive import STRETCHED
 from ..order import CellOrder
 from ..readout import present_density, shear_stress
 from . import kernels_warp as kernels
@@ -88,8 +89,8 @@ class SolverMPM(Solver):
         blocks = self.grid.blocks_per_world * scene.worlds
         slots = min(blocks, 512 + int(config.blocks_per_particle * pool.size))
         pool.add_field("affine", wp.mat33)
-        pool.add_field("volume_ratio", float, 1.0)
-        pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
+        pool.add_field("volume_ratio", float, 1.0, within=(1.0 / STRETCHED, STRETCHED))
+        pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
         pool.add_field("elastic_shear", wp.vec3)
         with wp.ScopedDevice(scene.device):
             self.table = wp.zeros(blocks, dtype=int)

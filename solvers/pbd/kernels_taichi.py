@@ -3,7 +3,7 @@ equations."""
 
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE, FREE
+from fluidbench.particles import CARRIED, FAULT_ASTRAY, FREE
 from fluidbench.scene import FRICTION, PERIODIC, STICK
 
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
@@ -31,7 +31,7 @@ from ..taichi_bridge import (
 )
 from . import laws
 from .bonds_taichi import bonded
-from .kernels_warp import FARTHEST, HURRIED, SLACK, SLACK_SOLID, STRETCHED, Numbers
+from .kernels_warp import FARTHEST, HURRIED, SLACK, SLACK_SOLID, Numbers
 
 kernel = taichi_func(poly6)
 summed = taichi_func(spiky)
@@ -164,7 +164,7 @@ def velocities(capacity: int, count: Ints, dt: Floats, held: Ints, motion: Vecto
 def strain(
     num: NumbersT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, dt: Floats,
     phases: Phases, phase_of: Ints, held: Ints, position: Vectors, mass: Floats, volume: Floats, velocity: Vectors,
-    elastic_normal: Vectors, elastic_shear: Vectors, stress: Matrices, fault: Ints,
+    elastic_normal: Vectors, elastic_shear: Vectors, stress: Matrices,
 ):  # fmt: skip
     for i in range(position.shape[0]):
         world = i // capacity
@@ -188,8 +188,6 @@ def strain(
                 if held[i] != CARRIED:
                     b, s = strained(phase, modulus, l, b, s, dt[world])
                     elastic_normal[i], elastic_shear[i] = b, s
-                    if beyond(b.sum(), STRETCHED) or b.sum() < 1.0:
-                        ti.atomic_or(fault[0], FAULT_STATE)
                 carried = elastic_stress(modulus, b, s, 0.0) @ correction
             stress[i] = carried
 

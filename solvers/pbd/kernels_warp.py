@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE
+from fluidbench.particles import CARRIED, FAULT_ASTRAY
 from fluidbench.scene import Box, Force, Phase, force_at, too_fast
 
 from .. import constitutive
@@ -37,7 +37,6 @@ SLACK = wp.constant(
 )  # density that is left alone, over that at rest: what the lattices of round bodies are off by
 HURRIED = wp.constant(10.0)  # corrections of a crowded start are this much faster, for a substep, than any matter
 FARTHEST = wp.constant(1.0e3)  # spacings beyond which no constraint wants a particle to move
-STRETCHED = wp.constant(1.0e6)  # trace of the elastic tensor that no matter reaches [-]
 SLACK_SOLID = wp.constant(0.1)  # a solid's bonds keep its density; the constraint only keeps its parts apart
 
 
@@ -192,7 +191,7 @@ def strain(
     velocity: wp.array(dtype=wp.vec3),
     # outputs
     elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-    stress: wp.array(dtype=wp.mat33), fault: wp.array(dtype=int),
+    stress: wp.array(dtype=wp.mat33),
 ):  # fmt: skip
     """Strain of the substep by the common material law, and the elastic deviator that answers it. There is no isotropic
     tension: density constraints only push."""
@@ -237,8 +236,6 @@ def strain(
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[i] = b
             elastic_shear[i] = s
-            if not (b[0] + b[1] + b[2] > 1.0 and b[0] + b[1] + b[2] < STRETCHED):
-                wp.atomic_or(fault, 0, FAULT_STATE)
         stress[i] = elastic_stress(modulus, b, s, 0.0) * correction
 
 

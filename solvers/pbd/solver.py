@@ -17,6 +17,7 @@ from fluidbench.timestep import Bound
 
 from .. import aging
 from ..backends import backend_of
+from ..constitutive import STRETCHED
 from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
 from ..order import CellOrder
 from ..readout import present_density
@@ -134,7 +135,7 @@ class SolverPBD(Solver):
         self.num.calm = config.calm
         self.num.stiffness = config.shear_stiffness
         if scene.flowing:
-            pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
+            pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
             pool.add_field("elastic_shear", wp.vec3)
         self.network = bonds.Network(scene, pool, self.backend, self.kernels) if bonds.needed(scene) else None
         with wp.ScopedDevice(scene.device):
@@ -266,7 +267,7 @@ class SolverPBD(Solver):
             self.kernels.strain,
             [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
              pool.position, pool.mass, pool.volume, pool.velocity],
-            [pool.elastic_normal, pool.elastic_shear, self.stress, pool.fault],
+            [pool.elastic_normal, pool.elastic_shear, self.stress],
         )  # fmt: skip
 
     def pull(self) -> None:

@@ -41,7 +41,7 @@ from ..taichi_bridge import (
     too_fast,
     vec3,
 )
-from .kernels_warp import CRUSHED, FLOOR, STRETCHED, WHOLE, Smoothing
+from .kernels_warp import CRUSHED, FLOOR, WHOLE, Smoothing
 
 kernel = taichi_func(wendland)
 slope = taichi_func(wendland_slope)
@@ -163,7 +163,8 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 growth = approach + num.density_feedback * sound / num.h * whole * drift
                 growth += 2.0 * num.density_diffusion * num.h * sound * spread / rho
                 rho += h * growth
-                broken = rho <= -rest or beyond(rho, CRUSHED * rest)
+                if rho <= -rest or beyond(rho, CRUSHED * rest):
+                    ti.atomic_or(fault[0], FAULT_STATE)
                 rho = ti.max(rho, FLOOR * rest)
                 new_density[i] = rho
                 p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
@@ -175,13 +176,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     if held[i] != CARRIED:
                         b, s = strained(phase, phase.shear_modulus, gradient, b, s, h)
                         elastic_normal[i], elastic_shear[i] = b, s
-                        broken = broken or beyond(b.sum(), STRETCHED) or b.sum() < 1.0
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     stress[i] = scale * (cauchy @ correction)
                 else:
                     load[i] = scale * p
-                if broken:
-                    ti.atomic_or(fault[0], FAULT_STATE)
 
     @ti.kernel
     def force(

@@ -18,6 +18,7 @@ from fluidbench.timestep import Bound
 
 from .. import aging
 from ..backends import backend_of
+from ..constitutive import STRETCHED
 from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
 from ..order import CellOrder
 from ..readout import shear_stress
@@ -129,7 +130,7 @@ class SolverSPH(Solver):
         self._rest_densities()
         solid = pool.size if scene.elastic else 1
         if scene.elastic:
-            pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
+            pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
             pool.add_field("elastic_shear", wp.vec3)
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
