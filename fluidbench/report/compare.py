@@ -11,7 +11,7 @@ from ..study.compare import tidy
 from ..study.execute import ADVICE, Finished
 from .figures import draw, draw_views
 from .html import write_page
-from .tables import against_reference, backends, costs, fidelity, show, successes
+from .tables import against_reference, backends, costs, failed_prints, fidelity, show, successes
 from .traces import plots
 
 if TYPE_CHECKING:
@@ -34,11 +34,9 @@ def publish(results: Sequence[Finished], root: Path, console: Console, label: st
     page = write_page(results, tables, drawn, views, root / ("report.html" if not prefix else f"{label}.html"))
     for table in tables:
         show(console, table)
+    for line in failed_prints(results):
+        console.print(line, markup=False)
     for result in results:
-        if result.ok and result.record.get("print", "sound") not in ("", "sound"):
-            unmet = [f"{c['name']} {c['measured']:.3g} (wanted {c['wanted']})" for c in result.record["success"]
-                     if not c["met"]]  # fmt: skip
-            console.print(f"{result.label}: the print is {result.record['print']}: {'; '.join(unmet)}", markup=False)
         if not result.ok:
             advice = ADVICE.get(result.verdict, "")
             console.print(f"{result.label}: {result.verdict}: {result.reason}; {advice}", markup=False)

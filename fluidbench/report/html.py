@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..scenario import Scenario
 from ..store import write_atomically
 from ..study.execute import ADVICE, Finished
-from .tables import Table
+from .tables import Table, failed_prints
 from .traces import Plot, run_files
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ ROWS = """{% macro rows(table) %}<table><thead><tr>
 {%- endfor %}</tr>{% endfor %}</tbody></table>
 {%- endmacro %}"""
 COMPARE = """{% extends "base" %}{% block body %}<p>{{ subtitle }}</p>
+{% for line in prints %}<p class="bad">{{ line }}</p>{% endfor %}
 {% for table in tables %}<h2>{{ table.title }}</h2>
 {{ rows(table) }}
 {% if table.note %}<p>{{ table.note }}</p>{% endif %}{% endfor %}
@@ -120,6 +121,7 @@ def write_page(
             f"{r.label}: {(v := r.record['verdict'])}: {r.record.get('reason', '')}; {ADVICE.get(v, '')}"
             for r in results if not r.ok
         ],
+        prints=failed_prints(results),
         notes=[f"{r.label}: {line}" for r in results if r.record["repeat"] == 0
                for line in r.record.get("approximations", [])],
         views=base64.b64encode(views.read_bytes()).decode() if views is not None else "",

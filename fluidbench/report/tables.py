@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from statistics import mean, stdev
 from typing import TYPE_CHECKING, Any
 
+from ..measure.tower import Print
 from ..study.compare import binding, lengths_of
 from ..study.execute import Finished
 from ..verdict import Evidence, evidence_of
@@ -113,6 +114,17 @@ def successes(results: Sequence[Finished]) -> Table | None:
         shown = [f"{number(c['measured'])} {'yes' if c['met'] else 'NO'}" for c in cells]
         table.rows.append([first["name"], first["wanted"], *shown])
     return table
+
+
+def failed_prints(results: Sequence[Finished]) -> list[str]:
+    """One line a print that is not sound: what became of it, and what it did not meet."""
+    lines = []
+    for result in results:
+        if result.ok and result.record.get("print", "") not in ("", Print.SOUND):
+            unmet = [f"{c['name']} {number(c['measured'])} (wanted {c['wanted']})"
+                     for c in result.record["success"] if not c["met"]]  # fmt: skip
+            lines.append(f"{result.label}: print {result.record['print']}: {'; '.join(unmet)}")
+    return lines
 
 
 def costs(results: Sequence[Finished]) -> Table:
