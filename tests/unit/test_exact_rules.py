@@ -1,0 +1,178 @@
+"""Every rule of the judged table on hand-made evidence, at its thresholds and a little beyond them."""
+
+import math
+
+import pytest
+
+from fluidbench.study.evidence import COST_CASES
+from fluidbench.study.verdicts import (
+    APART,
+    COLLAPSE,
+    CONFIRMED,
+    EFFECT,
+    FEWEST,
+    GOOD,
+    OPEN,
+    POOR,
+    REFUTED,
+    RULES,
+    agreed,
+    answers_of,
+    at_equal_error,
+    equal_error,
+    placed,
+    ranked,
+    share_within,
+    told,
+    winners,
+)
+
+from .made import case, trial
+
+LIQUID, SOLID = case("a", "liquid", 0.1), case("b", "elastic", 0.2)
+
+
+def test_the_thresholds_are_those_that_the_rules_say():
+    assert (EFFECT, GOOD, POOR, FEWEST, APART, COLLAPSE) == (1.2, 0.75, 0.5, 2, 0.1, 10.0)
+    assert "at least 75% of the known answers" in RULES["fidelity"] and "at most 50%" in RULES["fidelity"]
+    assert "a class needs 2 of them" in RULES["fidelity"] and "factor of 1.2 and two standard" in RULES["step"]
+    assert "a factor of 1.2 apart, on most of at least 2 cases" in RULES["equal error"]
+    assert "10-fold" in RULES["collapse"] and "1.2 times as far off" in RULES["artifacts"]
+    assert "over 10% from the mean" in RULES["prediction"] and "most of at least 2" in RULES["prediction"]
+
+
+def test_an_error_of_just_the_tolerance_is_within_it():
+    for error, within in ((0.1, 1), (0.1000001, 0), (math.nan, 0)):
+        assert share_within([trial(LIQUID, "mpm", error)], "mpm", ["liquid"]) == (within, 1)
+
+
+def test_answers_are_of_the_method_the_class_and_the_spacing_asked_for():
+    rows = [
+        trial(LIQUID, "mpm"), trial(LIQUID, "sph"), trial(SOLID, "mpm"), trial(LIQUID, "mpm", level="quick"),
+        trial(LIQUID, "mpm", level="medium"), trial(LIQUID, "mpm", level="rough"), trial(LIQUID, "mpm", level="fine"),
+        trial(LIQUID, "mpm", verdict="skipped"), trial(LIQUID, "mpm", verdict="diverged"),
+        trial(LIQUID, "mpm", verdict="timeout"),
+    ]  # fmt: skip
+    assert answers_of(rows, ["mpm"], ["liquid"]) == [rows[i] for i in (0, 3, 8, 9)]
+    assert answers_of(rows, ["mpm", "sph"], ["liquid", "elastic"]) == [rows[i] for i in (0, 1, 2, 3, 8, 9)]
+    assert share_within(rows, "mpm", ["liquid"]) == (2, 3)
+    assert told(rows[:7]) and told([rows[8]]) and not told([rows[0], rows[9]])
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "clear"),
+    [
+        ([10.0], [12.0], False),
+        ([10.0], [12.001], True),
+        ([10.0], [11.9], False),
+        ([8.0, 12.0], [15.8, 19.8], False),  # deviations of sqrt(8): twice hypot is 8, the means are 7.8 apart
+        ([8.0, 12.0], [16.2, 20.2], True),
+        ([10.0], [15.5, 19.5], True),  # one alone has no spread: twice sqrt(8) is 5.66, and 7.5 is more
+        ([10.0], [13.5, 17.5], False),
+        ([13.5, 17.5], [22.0], True),
+        ([14.5, 18.5], [22.0], False),
+    ],
+)
+def test_a_figure_is_clearly_above_by_a_factor_and_beyond_the_spread(first, second, clear):
+    places = ranked({"a": first, "b": second})
+    assert places == ({"a": (0, 1), "b": (1, 0)} if clear else {"a": (0, 0), "b": (0, 0)})
+
+
+def test_places_count_who_is_clearly_below_and_above():
+    assert ranked({"x": [4.0], "y": [1.0], "z": [2.0]}) == {"x": (2, 0), "y": (0, 2), "z": (1, 1)}
+    assert ranked({"x": [1.0], "y": [1.1], "z": [2.0]}) == {"x": (0, 1), "y": (0, 1), "z": (2, 0)}
+
+
+@pytest.mark.parametrize(
+    ("word", "right"),
+    [
+        ("lowest", {(0, 2)}),
+        ("highest", {(2, 0)}),
+        ("middle", {(1, 1)}),
+        ("upper", {(1, 0), (1, 1), (2, 0)}),
+    ],
+)
+def test_words_of_places(word, right):
+    every = {(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (2, 0)}
+    assert {place for place in every if placed(place, word) == CONFIRMED} == right
+    assert {place for place in every if placed(place, word) == REFUTED} == every - right
+
+
+def test_a_verdict_needs_every_resolution():
+    assert agreed([REFUTED]) == REFUTED and agreed([CONFIRMED] * 3) == CONFIRMED
+    assert agreed([CONFIRMED, CONFIRMED, REFUTED]) == OPEN and agreed([OPEN, OPEN]) == OPEN
+
+
+def laws(of, **methods):
+    """Trials of methods with (error, wall) at two spacings or more."""
+    return [trial(of, m, e, wall=w, spacing=of.spacing / (1 + i)) for m, rows in methods.items()
+            for i, (e, w) in enumerate(rows)]  # fmt: skip
+
+
+def test_cost_at_the_error_that_the_worst_reaches():
+    """Cost ~ error^-2 twice, and error^-1: at 0.1, the worst one's best, 16, 3 (0.2 / 0.1)^2 = 12 and 5 (0.3 / 0.1)."""
+    found = at_equal_error(laws(LIQUID, mpm=[(0.4, 1.0), (0.1, 16.0)], sph=[(0.2, 3.0), (0.05, 48.0)],
+                                pbd=[(0.3, 5.0), (0.05, 30.0)]))  # fmt: skip
+    assert found == pytest.approx({"mpm": 16.0, "sph": 12.0, "pbd": 15.0})
+
+
+def test_a_power_law_is_a_least_squares_line():
+    """Logarithms (0, 0), (-1, 2), (-2, 1): slope -1/2 through (-1, 1); at -2 that is 1.5."""
+    rows = [(1.0, 1.0), (math.exp(-1), math.exp(2)), (math.exp(-2), math.e)]
+    found = at_equal_error(laws(LIQUID, mpm=rows, sph=[(1.0, 1.0), (math.exp(-2), 7.0)]))
+    assert found == pytest.approx({"mpm": math.exp(1.5), "sph": 7.0})
+
+
+def test_where_the_error_does_not_fall_the_cheapest_within_it_counts():
+    rising = [(0.3, 1.0), (0.4, 2.0), (0.35, 1.5)]  # its best is the target, and its cost there 1
+    assert at_equal_error(laws(LIQUID, mpm=rising, sph=[(0.6, 4.0), (0.3, 8.0)])) == pytest.approx(
+        {"mpm": 1.0, "sph": 8.0}
+    )
+    odd = [(0.1, 3.0), (0.2, 2.0), (0.15, 1.9), (0.7, 40.0)]  # within 0.3 the cheapest costs 1.9
+    assert at_equal_error(laws(LIQUID, mpm=odd, sph=[(0.6, 4.0), (0.3, 8.0)]))["mpm"] == pytest.approx(1.9)
+
+
+def test_equal_error_needs_two_methods_of_two_errors_that_are_not_nothing():
+    two = [(0.4, 1.0), (0.1, 16.0)]
+    assert at_equal_error(laws(LIQUID, mpm=two)) == {} and at_equal_error([]) == {}
+    assert at_equal_error(laws(LIQUID, mpm=two, sph=[(0.2, 3.0)])) == {}
+    assert at_equal_error(laws(LIQUID, mpm=two, sph=[(0.2, 3.0), (0.0, 9.0)])) == {}
+    skipped = [*laws(LIQUID, mpm=two, sph=two), trial(LIQUID, "pbd", verdict="skipped")]
+    assert set(at_equal_error(skipped)) == {"mpm", "sph"}
+    assert at_equal_error([*skipped, trial(LIQUID, "pbd", verdict="refused")]) == {}
+
+
+def at_equal(factors):
+    """Trials of the cost cases: the same errors, at costs that differ by these factors."""
+    made = []
+    for name, by_method in zip(COST_CASES, factors, strict=False):
+        rows = {m: [(0.4, f), (0.1, 16.0 * f)] for m, f in by_method.items()}
+        made += laws(case(name, "liquid"), **rows)
+    return made
+
+
+def test_a_place_at_equal_error_is_that_on_most_cases():
+    up, down = {"mpm": 1.0, "sph": 5.0, "pbd": 2.0}, {"mpm": 5.0, "sph": 1.0, "pbd": 2.0}
+    assert equal_error(at_equal([up, up]), "sph", "highest") == (CONFIRMED, "dam_break: x 5, elliptic_drop: x 5")
+    assert equal_error(at_equal([up, down]), "sph", "highest") == (REFUTED, "dam_break: x 5, elliptic_drop: x 1")
+    assert equal_error(at_equal([up, down, up]), "sph", "highest")[0] == CONFIRMED
+    assert equal_error(at_equal([down, down, up]), "sph", "highest")[0] == REFUTED
+    assert equal_error(at_equal([up]), "sph", "highest") == (OPEN, "dam_break: x 5")
+    assert equal_error(at_equal([up, {"mpm": 1.0, "sph": 5.0}]), "sph", "highest") == (OPEN, "dam_break: x 5")
+    close = {"mpm": 1.0, "sph": 2.3, "pbd": 2.0}
+    assert equal_error(at_equal([close, close]), "sph", "highest")[0] == REFUTED
+    assert COST_CASES == ("dam_break", "elliptic_drop", "bead_area")
+
+
+def test_the_winner_is_the_cheapest_of_those_within_tolerance():
+    other = case("c", "liquid", 0.1)
+    rows = [
+        trial(LIQUID, "mpm", 0.1, wall=3.0), trial(LIQUID, "sph", 0.05, wall=2.0), trial(LIQUID, "pbd", 0.2, wall=1.0),
+        trial(other, "mpm", 0.01, wall=1.0), trial(other, "sph", 0.01, wall=2.0), trial(SOLID, "pbd", wall=0.1),
+    ]  # fmt: skip
+    assert winners(rows, ["liquid"]) == {"sph": 1, "mpm": 1}
+    again = case("d", "liquid", 0.1)
+    assert winners([*rows, trial(again, "sph")], ["liquid"]) == {"sph": 2, "mpm": 1}
+    assert winners(rows, ["elastic"]) == {"pbd": 1} and winners([trial(LIQUID, "mpm", 0.2)], ["liquid"]) == {}
+    law = case("e", "liquid", 0.1, drive=lambda dt: None)
+    assert winners([trial(law, "mpm")], ["liquid"]) == {}

@@ -1,0 +1,193 @@
+"""Cells of the judged table on hand-made evidence: what was measured, as it is written, and the verdict."""
+
+import pytest
+
+from fluidbench.solver import get_solver
+from fluidbench.study import table1 as module
+from fluidbench.study.evidence import METHODS, SHIPPED
+from fluidbench.study.table1 import (
+    best_for,
+    bound_dt,
+    cost,
+    fidelity,
+    limits,
+    paradigm,
+    stability,
+    table1,
+)
+from fluidbench.study.verdicts import CONFIRMED, OPEN, REFUTED
+
+from .made import BEAD, case, evidence, finished, known, repeated, trial
+
+SOFT = ("viscous", "yield stress", "elastic", "viscoelastic")
+
+
+def test_a_paradigm_is_no_claim():
+    assert [(c.row, c.method, c.rule, c.verdict, c.measured) for c in paradigm()] == [
+        ("paradigm", m, "definition", OPEN, get_solver(m).paradigm) for m in METHODS
+    ]
+
+
+@pytest.mark.parametrize(
+    ("method", "physics", "good", "bad", "verdict"),
+    [
+        ("mpm", "elastic", 3, 1, CONFIRMED), ("mpm", "elastic", 2, 1, REFUTED), ("mpm", "elastic", 1, 0, OPEN),
+        ("mpm", "elastic", 2, 0, CONFIRMED), ("sph", "liquid", 3, 1, CONFIRMED), ("sph", "liquid", 5, 2, REFUTED),
+        ("pbd", "liquid", 1, 1, CONFIRMED), ("pbd", "liquid", 2, 1, REFUTED), ("pbd", "liquid", 0, 1, OPEN),
+        ("pbd", "viscous", 0, 2, CONFIRMED), ("mpm", "liquid", 2, 0, OPEN), ("sph", "elastic", 2, 0, OPEN),
+    ],
+)  # fmt: skip
+def test_fidelity_is_the_share_of_known_answers(method, physics, good, bad, verdict):
+    cells = fidelity(evidence(known(method, good, bad, physics)))
+    kind = "liquids" if physics == "liquid" else "deformables and viscous"
+    assert len(cells) == 6
+    for cell in cells:
+        here = (cell.method, cell.row) == (method, f"fidelity, {kind}")
+        assert cell.verdict == (verdict if here else OPEN)
+        own = f"{good} of {good + bad}" if here else "0 of 0"
+        assert cell.measured == f"{own} known answers within tolerance" and len(cell.runs) == (good + bad) * here
+
+
+def test_fidelity_takes_all_four_classes_of_what_deforms_and_says_what_is_shipped_or_lost():
+    rows = [t for physics in SOFT for t in known("mpm", 1, 0, physics)]
+    rows[0].note = rows[1].note = SHIPPED
+    cell = fidelity(evidence(rows))[0]
+    assert (cell.method, cell.verdict, cell.paper) == ("mpm", CONFIRMED, "high")
+    assert cell.measured == f"4 of 4 known answers within tolerance (2 {SHIPPED})"
+    lost = fidelity(evidence([*rows, trial(case("x", "elastic"), "mpm", verdict="timeout")]))[0]
+    assert lost.verdict == OPEN and lost.measured.endswith(f"(2 {SHIPPED}); 1 could not be run")
+    assert len(lost.runs) == 5
+
+
+def limit(method, *steps, verdict="held", found=True):
+    """Rows of `stability`: at half a spacing and one, dt is so many times d / c."""
+    return [
+        {"method": method, "axis": "spacing", "value": v, "verdict": verdict, "lump_limit_found": found,
+         "dt_lump_s": step * v * BEAD.spacing / BEAD.wave_speed} for v, step in zip((0.5, 1.0), steps, strict=False)
+    ]  # fmt: skip
+
+
+def test_stable_steps_are_compared_over_d_by_c():
+    rows = {"mpm": limit("mpm", 0.5, 0.5), "sph": limit("sph", 0.2, 0.2), "pbd": limit("pbd", 2.0, 2.0, found=False)}
+    cells = stability(evidence(limits=rows))
+    assert [(c.method, c.paper, c.verdict) for c in cells] == [
+        ("mpm", "medium, medium dt", CONFIRMED), ("sph", "low, smaller dt", CONFIRMED),
+        ("pbd", "high, larger dt", CONFIRMED),
+    ]  # fmt: skip
+    assert cells[0].measured == "largest stable dt 0.50 and 0.50 d/c; mean default dt 0.0001 s"
+    assert cells[2].measured == "largest stable dt >= 2.00 and 2.00 d/c; mean default dt 0.0001 s"
+    assert all(len(c.runs) == 2 for c in cells)
+    turned = stability(evidence(limits=rows | {"sph": limit("sph", 0.9, 0.9)}))
+    assert [c.verdict for c in turned] == [REFUTED, REFUTED, CONFIRMED]
+
+
+def test_stable_steps_that_were_not_found_place_nobody():
+    rows = {"mpm": limit("mpm", 0.5, 0.5), "sph": limit("sph", 0.2, 0.2), "pbd": limit("pbd", 2.0, 2.0)}
+    failed = [limit("pbd", 2.0)[0], limit("pbd", 2.0, verdict="failed")[0]]
+    for broken in (rows | {"pbd": failed}, rows | {"pbd": limit("pbd", 2.0)}, {}):
+        cells = stability(evidence(limits=broken))
+        assert {c.verdict for c in cells} == {OPEN}
+    assert cells[0].measured.startswith("largest stable dt not found")
+    silent = stability(evidence(limits=rows, repeats={m: [finished(m, "error")] for m in METHODS}))
+    assert silent[0].measured == "largest stable dt 0.50 and 0.50 d/c"
+    extra = stability(evidence(limits=rows | {"pbd": [*rows["pbd"], failed[1]]}))
+    assert {c.verdict for c in extra} == {OPEN}
+
+
+def test_cost_at_equal_spacing_and_at_equal_error():
+    cells = cost(evidence(repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)))
+    spacing, error = cells[:3], cells[3:]
+    assert [(c.method, c.paper, c.verdict, c.measured) for c in spacing] == [
+        ("mpm", "mid-high", CONFIRMED, "4 ± 0 wall s / simulated s"),
+        ("sph", "high", CONFIRMED, "8 ± 0 wall s / simulated s"),
+        ("pbd", "low", CONFIRMED, "2 ± 0 wall s / simulated s"),
+    ]
+    assert {c.row for c in spacing} == {"cost at equal spacing"} and {len(c.runs) for c in spacing} == {2}
+    assert [c.verdict for c in cost(evidence(repeats=repeated(mpm=9.0, sph=8.0, pbd=8.0)))[:3]] == [REFUTED] * 3
+    assert [c.verdict for c in cost(evidence(repeats=repeated(1, mpm=4.0, sph=8.0, pbd=2.0)))[:3]] == [OPEN] * 3
+    two = repeated(mpm=4.0, sph=8.0) | {"pbd": [finished("pbd", "error")]}
+    assert [(c.method, c.verdict) for c in cost(evidence(repeats=two))[:2]] == [("mpm", OPEN), ("sph", OPEN)]
+    assert [(c.row, c.verdict) for c in error] == [("cost at equal error", OPEN)] * 3
+    assert error[0].measured == "over the cheapest: no case that all three can run at several spacings"
+    wide = {"mpm": [finished(wall_per_simulated_s=w) for w in (3.0, 5.0)]}
+    assert cost(evidence(repeats=wide))[0].measured == "4 ± 1 wall s / simulated s"
+    rows = [trial(case(name), m, e, wall=f * w, spacing=0.01 * w) for name in ("dam_break", "bead_area")
+            for m, f in (("mpm", 2.0), ("sph", 3.0), ("pbd", 1.0)) for e, w in ((0.4, 1.0), (0.1, 9.0))]  # fmt: skip
+    cells = cost(evidence([*rows, trial(case("other"), "mpm")]))[3:]
+    assert [c.verdict for c in cells] == [CONFIRMED] * 3 and {len(c.runs) for c in cells} == {4}
+    assert cells[0].measured == "over the cheapest: dam_break: x 2, bead_area: x 2"
+
+
+def test_what_a_method_is_best_for_is_what_it_wins():
+    def wins(method, n, physics):
+        return [trial(case(f"{physics}{method}{i}", physics), method) for i in range(n)]
+
+    def cells(*groups):
+        return {c.method: c for c in best_for(evidence([t for g in groups for t in g]))}
+
+    soft = cells(wins("mpm", 2, "elastic"), wins("sph", 1, "yield stress"), wins("pbd", 9, "viscous"))
+    assert soft["mpm"].verdict == CONFIRMED and soft["mpm"].measured == "cheapest within tolerance on: mpm 2, sph 1"
+    assert len(soft["mpm"].runs) == 3 and soft["sph"].measured.endswith("on: none") and soft["sph"].verdict == OPEN
+    assert cells(wins("mpm", 1, "viscoelastic"), wins("sph", 1, "elastic"))["mpm"].verdict == REFUTED
+    assert cells(wins("mpm", 1, "elastic"))["mpm"].verdict == OPEN
+    assert cells(wins("pbd", 2, "elastic"))["mpm"].verdict == REFUTED
+    liquid = cells(wins("sph", 1, "liquid"), wins("mpm", 2, "liquid"))["sph"]
+    assert liquid.verdict == REFUTED and liquid.measured.endswith("on: mpm 2, sph 1")
+    paced = best_for(evidence(repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)))[-1]
+    assert (paced.method, paced.paper, paced.verdict) == ("pbd", "real-time previews", CONFIRMED)
+    assert paced.measured == "at equal spacing, wall s / simulated s: mpm 4, sph 8, pbd 2" and len(paced.runs) == 6
+    assert best_for(evidence(repeats=repeated(mpm=2.0, sph=8.0, pbd=2.0)))[-1].verdict == REFUTED
+    assert best_for(evidence(repeats=repeated(mpm=4.0, pbd=2.0)))[-1].verdict == OPEN
+
+
+def test_memory_is_compared_by_particle_and_told_by_volume():
+    """400 bytes in (1.5 mm)^3 are 118.5 GB a cubic metre."""
+    cell = limits(evidence(repeats=repeated(mpm=4.0, sph=2.0, pbd=1.0)))[0]
+    assert (cell.row, cell.method, cell.verdict, len(cell.runs)) == ("limits: memory", "mpm", CONFIRMED, 6)
+    assert cell.measured == "mpm 400 B (119 GB/m^3), sph 200 B (59.3 GB/m^3), pbd 100 B (29.6 GB/m^3)"
+    assert limits(evidence(repeats=repeated(mpm=2.0, sph=2.0, pbd=1.0)))[0].verdict == REFUTED
+    assert limits(evidence(repeats=repeated(mpm=4.0, sph=2.0)))[0].row == "limits: grid artifacts"
+
+
+def test_a_step_collapses_when_it_shrinks_tenfold(monkeypatch):
+    seen = []
+
+    def steps(scenario, method, settings):
+        seen.append((method, *settings.items()))
+        return {1e-3: 10.0, 1e3: 1.0, 0.0: 9.99, 1e4: 1.0}[next(iter(settings.values()))]
+
+    monkeypatch.setattr(module, "bound_dt", steps)
+    cells = {c.row: c for c in limits(evidence())}
+    assert cells["limits: viscosity"].verdict == CONFIRMED and cells["limits: yield stress"].verdict == REFUTED
+    assert cells["limits: viscosity"].measured == "dt 10 s at 0.001 Pa s, 1 s at 1000: 10-fold"
+    assert cells["limits: yield stress"].measured == "dt 9.99 s at 0 Pa, 1 s at 10000: 9.99-fold"
+    assert [c.paper for c in cells.values() if c.rule == "collapse"] == ["high viscosity", "non-Newtonian"]
+    assert seen == [("sph", ("material.viscosity", 1e-3)), ("sph", ("material.viscosity", 1e3)),
+                    ("sph", ("material.yield_stress", 0.0)), ("sph", ("material.yield_stress", 1e4))]  # fmt: skip
+
+
+def test_a_bound_is_the_least_of_the_varied_scenario():
+    """A thousand Pa s in paste of 6 kPa: the viscous limit of SPH, with nu = 1 m^2/s and a little of its own."""
+    h, c = 1.5 * BEAD.spacing, BEAD.wave_speed
+    wanted = 0.09 * h**2 / (1.0 + 1.0 * h * c / 10.0)
+    assert bound_dt(BEAD, "sph", {"material.viscosity": 1e3}) == pytest.approx(wanted)
+    assert bound_dt(BEAD, "sph", {"material.viscosity": 1e3, "numerics.sph.viscous_number": 0.045}) == pytest.approx(
+        wanted / 2
+    )
+
+
+def test_the_table_has_every_cell_and_says_nothing_where_nothing_ran():
+    rows = known("mpm", 4, 0, "elastic")
+    cells = table1(evidence(rows, repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)))
+    assert {c.row for c in cells} >= {
+        "paradigm", "fidelity, liquids", "stability / dt", "cost at equal spacing", "cost at equal error", "best for",
+        "limits: memory", "limits: grid artifacts", "limits: viscosity", "limits: yield stress", "limits: accuracy",
+        "claim", "in both frameworks: claim",
+    }  # fmt: skip
+    assert CONFIRMED in {c.verdict for c in cells}
+    for t in rows:
+        t.runs, t.note = {}, SHIPPED
+    dead = evidence(rows, repeats={m: [finished(m, "error")] for m in METHODS})
+    assert {c.verdict for c in table1(dead)} == {OPEN}
+    blown = evidence(rows, repeats={m: [finished(m, "diverged")] for m in METHODS})
+    assert CONFIRMED in {c.verdict for c in table1(blown)}
