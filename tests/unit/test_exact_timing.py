@@ -1,0 +1,131 @@
+"""What the timing of the printed tower runs, and what it says of the paper's claims."""
+
+import pytest
+
+from fluidbench.errors import UserError
+from fluidbench.library import load
+from fluidbench.study import table2 as table2_module
+from fluidbench.study.table2 import Row, check_pools, claims, spread, table2
+from fluidbench.study.verdicts import CONFIRMED, OPEN, REFUTED
+from fluidbench.target import Target
+
+from .made import finished
+
+TAICHI = Target(backend="taichi")
+
+
+def row(variant, bare, filmed=(), pool=None):
+    return Row(variant, pool, "mpm", [finished(steps_per_s=s, simulated_to_real=s / 100) for s in bare],
+               [finished(steps_per_s=s, simulated_to_real=s / 100) for s in filmed])  # fmt: skip
+
+
+def said(rows):
+    return {claim: (measured, verdict) for _, claim, measured, verdict in claims(rows)}
+
+
+ORDER, MODEST = "both with the drone the most", "curing a modest overhead, expansion a stronger one"
+RENDER, POOL = "rendering the bottleneck", "cost insensitive to the pool's size"
+ALL = "expansion + curing + drone"
+
+
+@pytest.mark.parametrize(
+    ("curing", "expansion", "verdict"),
+    [
+        (60.0, 49.0, CONFIRMED),
+        (60.0, 51.0, REFUTED),
+        (50.0, 10.0, REFUTED),
+        (50.1, 10.0, CONFIRMED),
+        (60.0, 50.0, REFUTED),
+    ],
+)
+def test_curing_is_modest_below_twofold_and_expansion_a_fifth_more(curing, expansion, verdict):
+    rows = [row("plain", [90.0, 110.0]), row("curing", [curing, curing]), row("expansion", [expansion] * 2)]
+    assert said(rows)[MODEST] == (
+        f"steps/s fall {100 / curing:.2f}-fold with curing, {100 / expansion:.2f}-fold with expansion", verdict
+    )  # fmt: skip
+    assert MODEST not in said(rows[:2]) and ORDER not in said(rows)
+
+
+def test_the_drone_is_the_slowest_and_pictures_halve():
+    names = ["plain", "curing", "expansion", "expansion + curing", ALL]
+    rows = [row(n, [s, s]) for n, s in zip(names, (90.0, 80.0, 70.0, 60.0, 50.0), strict=True)]
+    assert said(rows)[ORDER] == (
+        "steps/s: plain 90, curing 80, expansion 70, expansion + curing 60, expansion + curing + drone 50", CONFIRMED
+    )  # fmt: skip
+    assert said([row("plain", [40.0, 40.0]), *rows[1:]])[ORDER][1] == REFUTED
+    assert RENDER not in said(rows)
+    for share, verdict in ((0.49, CONFIRMED), (0.5, REFUTED), (0.9, REFUTED)):
+        filmed = [*rows[:4], row(ALL, [100.0, 100.0], [100 * share] * 2)]
+        assert said(filmed)[RENDER] == (f"with pictures {share:.0%} of the steps/s without", verdict)
+    assert RENDER not in said([row(ALL, [100.0] * 2, [50.0])]) and RENDER not in said([row(ALL, [100.0], [50.0] * 2)])
+
+
+@pytest.mark.parametrize(
+    ("small", "verdict"), [(119.0, CONFIRMED), (120.0, REFUTED), (84.0, CONFIRMED), (83.0, REFUTED)]
+)
+def test_a_pool_matters_from_a_fifth_on(small, verdict):
+    rows = [
+        row("plain", [small] * 2, pool=1000),
+        row("plain", [7.0] * 2, pool=2000),
+        row("plain", [100.0] * 2, pool=9000),
+    ]
+    assert said(rows)[POOL] == (f"{small / 100:.2f}-fold from the small to the large pool", verdict)
+
+
+def test_a_pools_size_needs_two_pools_and_two_repeats():
+    assert said([row("plain", [1.0, 1.0])])[POOL] == ("one pool, or one repeat", OPEN)
+    for a, b in (([1.0], [1.0, 1.0]), ([1.0, 1.0], [1.0])):
+        assert said([row("plain", a, pool=1), row("plain", b, pool=2)])[POOL][1] == OPEN
+    assert said([row("curing", [1.0, 1.0], pool=1), row("curing", [1.0, 1.0], pool=2)])[POOL][1] == OPEN
+
+
+def test_claims_are_of_the_last_pool():
+    rows = [row(n, [s] * 2, pool=p) for p, last in ((1, 10.0), (2, 60.0)) for n, s in
+            (("plain", 100.0), ("curing", 90.0), ("expansion", last))]  # fmt: skip
+    assert said(rows)[MODEST][0].endswith("1.67-fold with expansion")
+
+
+def test_rows_of_the_tower_are_run_bare_and_filmed(monkeypatch):
+    calls = []
+
+    def execute(planned, store, hooks):
+        calls.append(planned)
+        return [finished(j.method) for j in planned]
+
+    monkeypatch.setattr(table2_module, "execute", execute)
+    rows = table2(["mpm"], [None], 3, True, None, None, Target(), 9.0)
+    assert len(rows) == 5 and {r.method for r in rows} == {"mpm"} and {r.pool for r in rows} == {None}
+    assert [len(call) for call in calls] == [3] * 10
+    for call in calls:
+        assert [j.repeat for j in call] == [0, 1, 2] and {j.wall_limit for j in call} == {9.0}
+    assert [call[0].film_every for call in calls] == [None, 0.033] * 5
+    assert [call[0].variant for call in calls] == ["", "pictures"] * 5  # a filmed run is another run
+    names = [call[0].scenario["name"] for call in calls]
+    assert names[::2] == names[1::2] == [
+        "ring_tower", "ring_tower_curing", "ring_tower_expansion", "ring_tower_expansion_curing", "ring_tower_drone",
+    ]  # fmt: skip
+    assert [len(r.bare) for r in rows] == [len(r.filmed) for r in rows] == [3] * 5
+    assert calls[0][0].scenario == load("ring_tower", quick=True).model_dump(mode="json")
+    sized = table2(["mpm", "sph"], [None, 400_000], 1, True, None, None, Target(), 9.0)
+    assert [(r.method, r.pool) for r in sized[::5]] == [
+        ("mpm", None),
+        ("mpm", 400_000),
+        ("sph", None),
+        ("sph", 400_000),
+    ]
+    assert calls[-1][0].scenario["pool"] == 400_000 and calls[-1][0].method == "sph"
+
+
+def test_speeds_of_a_row_and_their_spread():
+    made = row("plain", [90.0, 110.0], [40.0])
+    assert made.speed() == [90.0, 110.0] and made.speed(True) == [40.0] and made.pace() == [0.9, 1.1]
+    assert made.pace(filmed=True) == [0.4]
+    assert spread(made.speed()) == "100 ± 14" and spread([1.23456]) == "1.235" and spread([]) == "-"
+    lacks = Row("plain", None, "mpm", [finished(verdict="error")], [finished("sph", "timeout")])
+    assert lacks.speed() == [] and len(lacks.missing()) == 2
+
+
+def test_a_pool_that_a_variant_overfills_is_refused():
+    check_pools([None], True)
+    with pytest.raises(UserError, match="pool = 1000 is too small"):
+        check_pools([None, 1000], True)
