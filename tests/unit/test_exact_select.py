@@ -1,0 +1,260 @@
+"""Selection by hand: trust, extrapolation, consensus, bias, the front, the recommendation, and how sure it is."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fluidbench.study import select as module
+from fluidbench.study.select import (
+    Candidate,
+    Fit,
+    Selection,
+    Trust,
+    assess,
+    confidence,
+    extrapolate,
+    physics_of,
+    select,
+    trust_of,
+)
+from fluidbench.target import Target
+
+from ..conftest import bead, scenario
+from .made import BEAD, finished
+
+ALWAYS = (math.inf, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("made", "classes"),
+    [
+        (scenario(), {"liquid"}),
+        (scenario(material={"density": 1.0, "viscosity": 0.1}), {"viscous"}),
+        (scenario(material={"density": 1.0, "youngs_modulus": 1.0}), {"elastic"}),
+        (scenario(material={"density": 1.0, "youngs_modulus": 1.0, "yield_stress": 0.1}), {"yield stress"}),
+        (scenario(material={"density": 1.0, "youngs_modulus": 1.0, "relaxation_time": 0.1}), {"viscoelastic"}),
+        (scenario(material={"density": 1.0, "youngs_modulus": 1.0, "yield_stress": 0.0}), {"liquid"}),
+        (bead(), {"emission", "yield stress"}),
+    ],
+)
+def test_known_answers_are_of_the_scenarios_physics(made, classes):
+    assert physics_of(made) == classes
+
+
+def test_trust_is_more_than_half_of_the_answers_of_this_physics(monkeypatch):
+    rows = [("mpm", "yield stress", 0.1, 0.1), ("mpm", "emission", 0.2, 0.1), ("mpm", "liquid", 0.9, 0.1),
+            ("sph", "emission", 0.05, 0.1), ("sph", "emission", 0.05, 0.1), ("sph", "yield stress", math.nan, 0.1)]  # fmt: skip
+    table = pd.DataFrame(rows, columns=["method", "physics", "error", "tolerance"])
+    monkeypatch.setattr(module, "reference", lambda name: {"known_answers": table}[name])
+    found = trust_of(BEAD, ["mpm", "sph", "pbd"])
+    assert found == {"mpm": Trust(1, 2), "sph": Trust(2, 3), "pbd": Trust(0, 0)}
+    assert [t.trusted for t in found.values()] == [False, True, False]
+
+
+def run(method, spacing, wall=None, answers=(), **measures):
+    wall = spacing**-4 if wall is None else wall
+    more = {"wall_s": wall, "wall_per_simulated_s": 2 * wall, "mean_dt_s": 3 * spacing, "answers": list(answers)}
+    return finished(method, measures=measures, spacing=spacing, **more)
+
+
+def test_extrapolation_weighs_by_the_inverse_spacing():
+    """Minimising sum ((q - a - b d) / d)^2 over d = 1, 2, 4 and q = 1, 2, 0."""
+    d, q = np.array([1.0, 2.0, 4.0]), np.array([1.0, 2.0, 0.0])
+    slope, limit = np.linalg.lstsq(np.stack([np.ones(3), 1 / d], axis=1), q / d, rcond=None)[0]
+    fit = extrapolate([run("mpm", a, height_m=b) for a, b in zip(d, q, strict=True)], "height_m")
+    assert fit.limit == pytest.approx(limit) and fit.slope == pytest.approx(slope)
+    assert fit.residual == pytest.approx({a: abs(b - limit - slope * a) for a, b in zip(d, q, strict=True)})
+
+
+def test_scatter_is_the_largest_from_a_spacing_down():
+    fit = Fit(1.0, 0.0, {1.0: 0.3, 2.0: 0.1, 4.0: 0.5})
+    assert [fit.scatter(d) for d in (1.0, 2.0, 4.0)] == [0.3, 0.3, 0.5]
+    assert Fit(1.0, 0.0, {0.3: 0.2, 0.1 * 3: 0.1}).scatter(0.3 * (1 - 1e-12)) == 0.2  # rounding leaves none out
+
+
+@pytest.mark.parametrize(
+    ("limit", "slope", "largest", "explains"),
+    [
+        (0.0, 1.0, 1.5, True),  # half of a rise of 3 over the spacings
+        (0.0, -1.0, 1.5, True),
+        (0.0, 1.0, 1.51, False),
+        (10.0, 0.0, 0.1, True),  # a hundredth of the length
+        (-10.0, 0.0, 0.1, True),
+        (10.0, 0.0, 0.101, False),
+    ],
+)
+def test_a_line_explains_what_rises_twice_its_scatter_or_scatters_by_a_percent(limit, slope, largest, explains):
+    assert Fit(limit, slope, {1.0: 0.0, 2.0: -largest if largest < 0 else largest, 4.0: 0.0}).explains is explains
+
+
+def trusting(monkeypatch, *trusted):
+    monkeypatch.setattr(module, "trust_of", lambda _, ms: {m: Trust(m in trusted, 1) for m in ms})
+
+
+def line(method, limit, slope, spacings=(1.0, 2.0, 4.0), key="height_m"):
+    return [run(method, d, **{key: limit + slope * d}) for d in spacings]
+
+
+def test_error_is_the_distance_to_the_methods_limit_and_the_consensus_over_it(monkeypatch):
+    """Limits 10 and 12, consensus 11: at d = 2 a height of 10.4 is 0.4 / 11 from its limit, which is 1 / 11 off."""
+    trusting(monkeypatch, "mpm", "sph")
+    found = assess(
+        BEAD, ["mpm", "sph", "pbd"], line("mpm", 10.0, 0.2) + line("sph", 12.0, -0.1) + line("pbd", 33.0, 0.0)
+    )
+    assert found.limits["mpm"]["height_m"] == pytest.approx(10.0)
+    by_run = {(c.method, c.spacing): c for c in found.candidates}
+    assert len(by_run) == 9
+    assert by_run["mpm", 2.0].discretisation == pytest.approx(0.4 / 11)
+    assert by_run["mpm", 2.0].bias == pytest.approx(1 / 11) == by_run["sph", 1.0].bias
+    assert by_run["sph", 4.0].discretisation == pytest.approx(0.4 / 11)
+    assert by_run["pbd", 1.0].bias == pytest.approx(2.0) and by_run["pbd", 1.0].discretisation == pytest.approx(
+        0.0, abs=1e-9
+    )
+    one = by_run["sph", 2.0]
+    assert (one.dt, one.wall, one.pace, one.error) == (6.0, 2.0**-4, 2.0**-3, one.discretisation + one.bias)
+    trusting(monkeypatch)
+    nobody = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + line("sph", 12.0, -0.1))
+    assert nobody.candidates[0].bias == pytest.approx(1 / 11)
+    assert nobody.notes == ["no method passes most known answers of this physics: the consensus is the mean of all"]
+
+
+def test_scatter_counts_where_it_is_larger_than_the_distance(monkeypatch):
+    trusting(monkeypatch, "mpm")
+    rows = [run("mpm", d, height_m=h) for d, h in ((1.0, 10.0), (2.0, 10.4), (4.0, 10.0))]
+    fit = extrapolate(rows, "height_m")
+    found = {c.spacing: c.discretisation for c in assess(BEAD, ["mpm"], rows).candidates}
+    for d, h in ((1.0, 10.0), (2.0, 10.4), (4.0, 10.0)):
+        assert found[d] == pytest.approx(max(abs(h - fit.limit), fit.scatter(d)) / fit.limit)
+    assert max(abs(10.0 - fit.limit), 0) < fit.scatter(4.0)
+
+
+def test_the_worst_length_decides(monkeypatch):
+    trusting(monkeypatch, "mpm")
+    rows = [run("mpm", d, height_m=10.0 + 0.1 * d, bead_width_m=5.0 - 0.2 * d) for d in (1.0, 2.0, 4.0)]
+    found = {c.spacing: c.discretisation for c in assess(BEAD, ["mpm"], rows).candidates}
+    assert found == pytest.approx({1.0: 0.04, 2.0: 0.08, 4.0: 0.16})
+
+
+def test_an_exact_length_is_judged_against_its_answer_alone(monkeypatch):
+    trusting(monkeypatch, "mpm")
+    answer = [{"quantity": "bead area [m^2]", "reference": 2.0}, {"quantity": "slump", "reference": 9.0}]
+    rows = [run("mpm", d, answers=answer, bead_area_m2=a) for d, a in ((1.0, 2.2), (2.0, 1.6), (4.0, 2.0))]
+    found = assess(BEAD, ["mpm"], rows)
+    assert [(c.discretisation, c.bias) for c in found.candidates] == [
+        (pytest.approx(0.1), 0.0), (pytest.approx(0.2), 0.0), (0.0, 0.0),
+    ]  # fmt: skip
+    assert not found.erratic
+
+
+def test_two_spacings_are_not_enough(monkeypatch):
+    trusting(monkeypatch, "mpm", "sph")
+    blown = [finished("sph", "diverged", spacing=4.0)]
+    found = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + line("sph", 12.0, 0.1, (1.0, 2.0)) + blown)
+    assert {c.method for c in found.candidates} == {"mpm"} and list(found.limits) == ["mpm"]
+    assert found.notes[0] == "sph: only 2 spacings completed, 3 are needed"
+    assert "the consensus is mpm's own limit" in found.notes[1] and len(found.runs) == 6 and found.missing() == []
+
+
+def test_what_no_line_explains_is_erratic(monkeypatch):
+    trusting(monkeypatch, "mpm", "sph")
+    wild = [run("sph", d, height_m=h) for d, h in ((1.0, 10.0), (2.0, 13.0), (4.0, 10.1))]
+    found = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + wild)
+    assert found.erratic == {"sph"} and not found.converges("sph") and found.converges("mpm")
+    assert found.notes[-1].startswith("sph: not converged")
+
+
+def made(*rows, method="mpm", bias=0.0):
+    """A selection of candidates (spacing, wall, discretisation)."""
+    found = [Candidate(method, d, 1e-4, w, 10 * w, e, bias, finished(method)) for d, w, e in rows]
+    return Selection(found, {method: Trust(1, 1)}, {method: {"height_m": 1.0}}, [])
+
+
+def test_order_is_the_slope_of_the_errors_that_are_not_nothing():
+    assert made((1.0, 1, 0.01), (2.0, 1, 0.04), (4.0, 1, 0.16)).order("mpm") == pytest.approx(2.0)
+    assert math.isnan(made((1.0, 1, 0.01), (2.0, 1, 0.04)).order("mpm"))
+    assert math.isnan(made((1.0, 1, 0.0), (2.0, 1, 0.04), (4.0, 1, 0.16)).order("mpm"))
+    assert math.isnan(made((1.0, 1, 0.01), (2.0, 1, 0.04), (4.0, 1, 0.16)).order("sph"))
+    least = made((1.0, 1, 1.0), (math.e, 1, math.exp(2)), (math.exp(2), 1, math.e))  # (0, 0), (1, 2), (2, 1)
+    assert least.order("mpm") == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("errors", "converges"),
+    [
+        ((0.01, 0.02, 0.04), True),
+        ((0.021, 0.02, 0.04), False),  # no better at the finest
+        ((0.02, 0.02, 0.08), True),
+        ((0.02, 0.0285, 0.0399), False),  # of order 0.498
+        ((0.02, 0.0284, 0.0403), True),  # of order 0.505
+        ((0.0, 0.02, 0.01), True),
+        ((0.01, 0.02), False),
+    ],
+)
+def test_a_method_converges_when_its_error_falls_at_half_an_order(errors, converges):
+    rows = [(2.0**i, 1.0, e) for i, e in enumerate(errors)]
+    assert made(*rows[::-1]).converges("mpm") is converges
+
+
+def test_the_front_is_what_nothing_beats_in_both():
+    found = made((1.0, 5.0, 0.1), (2.0, 1.0, 0.3), (3.0, 2.0, 0.3), (4.0, 3.0, 0.4), (5.0, 3.0, 0.2), (6.0, 5.0, 0.05))
+    assert [c.spacing for c in found.front()] == [2.0, 5.0, 6.0]
+    biased = Selection([*found.candidates, *made((9.0, 0.5, 0.0), bias=0.9).candidates], {}, {}, [])
+    assert [c.spacing for c in biased.front()] == [9.0, 2.0, 5.0, 6.0]
+
+
+def test_the_recommendation_is_the_cheapest_that_meets_all():
+    found = made((1.0, 9.0, 0.1), (2.0, 4.0, 0.2), (3.0, 5.0, 0.15), (4.0, 1.0, 0.5))
+
+    def best(tolerance, budget=math.inf, pace=math.inf):
+        candidate, why = found.recommend(tolerance, budget, pace)
+        return candidate and candidate.spacing, why
+
+    assert best(0.2) == (2.0, "") and best(0.19) == (3.0, "") and best(0.1) == (1.0, "") and best(0.6) == (4.0, "")
+    assert best(0.15, budget=5.0) == (3.0, "") and best(0.15, pace=50.0) == (3.0, "")
+    late = "nothing within the tolerance meets the budget; this is the fastest"
+    assert best(0.15, budget=4.9) == (3.0, late) and best(0.15, pace=49.9) == (3.0, late)
+    assert best(0.09) == (1.0, "nothing tried meets the tolerance; this is the nearest")
+    assert Selection([], {}, {}, []).recommend(0.1, *ALWAYS) == (None, "no method completed at three spacings")
+    assert made((1.0, 1.0, 0.05), bias=0.06).recommend(0.1, *ALWAYS)[1].startswith("nothing tried")
+
+
+@pytest.mark.parametrize(
+    ("limits", "tolerance", "sure"),
+    [
+        ((10.0, 11.0), 0.0953, "high: the limits of mpm and sph differ by at most 9.5%"),
+        ((10.0, 11.0), 0.0952, "medium: the limits of mpm and sph differ by at most 9.5%"),
+        ((11.0, 10.0), 0.2, "high: the limits of mpm and sph differ by at most 9.5%"),
+    ],
+)
+def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, sure):
+    trusting(monkeypatch, "mpm", "sph")
+    rows = line("mpm", limits[0], 0.2) + line("sph", limits[1], 0.2) + line("pbd", 99.0, 0.2)
+    for r in rows:
+        if r.record["method"] == "mpm":
+            r.record["measures"]["slump"] = 0.1 * r.record["spacing_m"]  # a length that the others do not have
+    found = assess(BEAD, ["mpm", "sph", "pbd"], rows)
+    assert confidence(found, tolerance) == sure
+    found.erratic.add("sph")
+    assert confidence(found, tolerance) == f"low: {sure.partition(': ')[2]}, but sph is not converged"
+    trusting(monkeypatch)
+    assert confidence(assess(BEAD, ["mpm"], line("mpm", 10.0, 0.2)), 1.0).startswith("low: no method passes")
+    trusting(monkeypatch, "mpm", "sph")
+    parted = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + line("sph", 10.0, 0.2, key="slump"))
+    assert confidence(parted, 1e9) == "medium: the limits of mpm and sph differ by at most inf%"
+
+
+def test_four_spacings_are_run_of_every_method_where_the_nozzle_allows(monkeypatch):
+    planned = []
+    monkeypatch.setattr(module, "execute", lambda jobs, *_: planned.extend(jobs) or [])
+    select(BEAD, ["mpm", "sph"], None, None, Target(), 5.0)
+    assert [(j.method, j.scenario["spacing"]) for j in planned] == [
+        (m, pytest.approx(f * 1.5e-3)) for m in ("mpm", "sph") for f in (2.0, 1.5, 1.0, 0.75)
+    ]
+    assert {j.wall_limit for j in planned} == {5.0}
+    planned.clear()
+    select(
+        BEAD.model_copy(update={"spacing": 4e-3}), ["mpm"], None, None, Target(), 5.0
+    )  # 8 mm do not fit twice into 12
+    assert [j.scenario["spacing"] for j in planned] == pytest.approx([6e-3, 4e-3, 3e-3])

@@ -1,0 +1,87 @@
+"""What select says: the recommendation in words, the tables and the plot."""
+
+import math
+
+import pytest
+
+from fluidbench.report import select as page
+from fluidbench.study.select import (
+    Candidate,
+    Selection,
+    Trust,
+)
+
+from .made import BEAD, finished
+
+ALWAYS = (math.inf, math.inf)
+
+
+def made(*rows, method="mpm", bias=0.0):
+    """A selection of candidates (spacing, wall, discretisation)."""
+    found = [Candidate(method, d, 1e-4, w, 10 * w, e, bias, finished(method)) for d, w, e in rows]
+    return Selection(found, {method: Trust(1, 1)}, {method: {"height_m": 1.0}}, [])
+
+
+def words(found, tolerance=0.2, budget=math.inf, pace=math.inf):
+    for c in found.candidates:
+        c.run.record["machine"] = {"cores": "2"}
+    return page._findings(BEAD, "line_bead", found, tolerance, budget, pace)
+
+
+def test_findings_name_the_best_and_what_twice_would_take():
+    found = made((1.0, 8.0, 0.1), (2.0, 4.0, 0.2), (4.0, 2.0, 0.4))
+    lines = words(found)
+    assert lines[0] == "Tolerance 20 %; budget: none."
+    assert lines[1] == (
+        "Recommended: mpm at spacing 2 m (mean dt 0.0001 s): error 20.0% (discretisation 20.0%, bias 0.0%), 4 s, "
+        "40 wall s per simulated s."
+    )
+    assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2"
+    assert lines[3].startswith("Twice as accurate: mpm at spacing 1 m") and lines[4].startswith(
+        "Twice as fast: mpm at spacing 4 m"
+    )
+    assert lines[5].endswith("(known answers: emission, yield stress).")
+    finest = words(found, 0.1, 60.0, 1.5)
+    assert finest[0] == "Tolerance 10 %; budget: 60 s and 1.5 wall s per simulated s."
+    assert "But nothing within the tolerance meets the budget; this is the fastest." in finest[1]
+    assert finest[3] == (
+        "Twice as accurate: nothing tried; at its observed order of 1 it takes 0.5 of the spacing, 16 times the work."
+    )
+    assert finest[4].startswith("Twice as fast: mpm at spacing 2 m")
+    assert words(found, 0.4)[4] == "Twice as fast: nothing tried."
+    assert words(Selection([], {}, {}, [], ["note"])) == [
+        "No recommendation: no method completed at three spacings.",
+        "note",
+    ]
+
+
+def test_twice_as_accurate_is_the_cheapest_and_twice_as_fast_the_most_accurate():
+    found = made((1.0, 9.0, 0.1), (2.0, 8.0, 0.1), (3.0, 4.0, 0.2), (4.0, 2.0, 0.5), (5.0, 1.5, 0.6), (6.0, 8.5, 0.05))
+    lines = words(found)
+    assert "spacing 3 m" in lines[1] and "spacing 2 m" in lines[3] and "spacing 4 m" in lines[4]
+
+
+def test_what_half_the_error_takes():
+    second = made((1.0, 8.0, 0.01), (2.0, 4.0, 0.04), (4.0, 2.0, 0.16))
+    assert page._further(second, second.candidates[0]) == (
+        "at its observed order of 2 it takes 0.71 of the spacing, 4 times the work"
+    )
+    nothing = made((1.0, 8.0, 0.0), (2.0, 4.0, 0.0), (4.0, 2.0, 0.0))
+    assert page._further(nothing, nothing.candidates[0]).endswith("nothing but what cannot be measured")
+
+
+def test_tables_and_plot_of_the_candidates():
+    found = made((1.0, 8.0, 0.1), (2.0, 4.0, 0.2), (4.0, 5.0, 0.4), bias=0.01)
+    front = found.front()
+    rows = page._candidates(found, front).rows
+    assert rows[0] == ["mpm", "2", "0.0001", "4", "40", "21.0%", "20.0%", "1.0%", "yes"]
+    assert [row[1] for row in rows] == ["2", "4", "1"] and [row[-1] for row in rows] == ["yes", "-", "yes"]
+    found.trust["sph"] = Trust(1, 4)
+    assert page._evidence(found).rows == [["mpm", "1", "1 of 1", "yes"], ["sph", "nan", "1 of 4", "no"]]
+    dominated, best = page._plot(found, front).traces
+    assert (list(dominated.x), list(dominated.y)) == ([5.0], [pytest.approx(41.0)])
+    assert (list(best.x), list(best.y)) == ([4.0, 8.0], pytest.approx([21.0, 11.0]))
+    assert page._row(found.candidates[0], True) == {
+        "method": "mpm", "spacing_m": 1.0, "mean_dt_s": 1e-4, "wall_s": 8.0, "wall_per_simulated_s": 80.0,
+        "error": pytest.approx(0.11), "discretisation": 0.1, "bias": 0.01, "on_front": True,
+    }  # fmt: skip
