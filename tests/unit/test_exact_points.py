@@ -1,0 +1,194 @@
+"""Points of the study of stability: axes, tasks, what a point measures, and the findings."""
+
+import pytest
+
+from fluidbench.errors import UserError
+from fluidbench.solver import get_solver
+from fluidbench.study import limits, stability
+from fluidbench.study.limits import Limit, default_dt
+from fluidbench.study.stability import (
+    AXES,
+    BARE,
+    BLOCKS,
+    block_material,
+    block_tasks,
+    choose,
+    findings,
+    measure_block,
+    measure_blocks,
+    measure_point,
+    measure_points,
+    point_tasks,
+    theory,
+    varied,
+)
+from fluidbench.target import Target
+
+from ..conftest import bead, scenario
+from .made import BEAD
+
+WATER = {"density": 1000.0, "sound_speed": 10.0}
+
+
+def test_axes_set_their_keys():
+    assert AXES["viscosity"].setting(BEAD, 3.0) == {"material.viscosity": 3.0}
+    assert AXES["spacing"].setting(BEAD, 2.0) == {"spacing": 3e-3}
+    assert AXES["particles_per_cell"].setting(BEAD, 8) == {"numerics.mpm.grid_ratio": pytest.approx(2.0)}
+    assert list(choose([])) == list(AXES) and list(choose(["density"])) == ["density"]
+    for axis in AXES.values():
+        assert list(axis.values) == sorted(set(axis.values)) and set(axis.quick) <= set(axis.values)
+        assert (axis.quick[0], axis.quick[-1]) == (axis.values[0], axis.values[-1])
+
+
+def test_tasks_are_every_axis_method_and_value():
+    tasks = point_tasks(BEAD, choose(["density", "particles_per_cell"]), ["mpm", "sph"], True, Target())
+    assert [(label, t["value"]) for label, t in tasks] == [
+        *[(f"density-{m}", v) for m in ("mpm", "sph") for v in (10.0, 1e3, 1e4)],
+        *[("particles_per_cell-mpm", v) for v in (1, 8, 27)],
+    ]
+    assert tasks[0][1]["settings"] == {"material.density": 10.0} and tasks[0][1]["quick"] is True
+    assert len(point_tasks(BEAD, choose(["density"]), ["pbd"], False, Target())) == 5
+    made = block_tasks(["mpm", "sph", "pbd"], True, Target())
+    assert [label for label, _ in made] == [f"block-{k}-{m}" for m in ("mpm", "sph") for k in BLOCKS]
+    assert {t["precision"] for _, t in made} == {0.1} and block_tasks(["mpm"], False, Target())[0][1][
+        "precision"
+    ] == 0.03
+
+
+def test_a_varied_scenario_changes_only_its_keys():
+    table = bead(nozzle={"diameter": 0.012, "flow_rate": 1e-5, "standoff": 0.01}).model_dump(mode="json")
+    changed = varied(table, {"nozzle.exit_speed": 0.2, "material.density": 7.0})
+    assert (changed.nozzle.exit_speed, changed.nozzle.flow_rate, changed.material.density) == (0.2, None, 7.0)
+    assert varied(table, {}).model_dump(mode="json") == table
+    with pytest.raises(UserError, match="the scenario has no nozzle"):
+        varied(scenario().model_dump(mode="json"), {"nozzle.exit_speed": 1.0})
+
+
+def test_a_block_of_the_scenarios_material_does_not_yield():
+    assert block_material(bead()) == {
+        "density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "viscosity": 0.0, "plastic_viscosity": 0.0,
+        "flow_index": 1.0, "equation_of_state": "linear",
+    }  # fmt: skip
+    water = scenario()
+    assert block_material(water)["sound_speed"] == water.liquid_sound_speed
+    assert "sound_speed" not in block_material(scenario(material={"density": 1.0, "bulk_modulus": 3.0}))
+    assert block_material(scenario(material=WATER))["sound_speed"] == 10.0
+    oldroyd = scenario(material={"density": 1.0, "youngs_modulus": 3.0, "relaxation_time": 0.5})
+    assert block_material(oldroyd)["relaxation_time"] == 0.5 and "sound_speed" not in block_material(oldroyd)
+
+
+def point(monkeypatch, method="mpm", quick=True, survive=lambda dt: None, block_dt=0.5, opening=None):
+    """A point of density whose lump comes through where `survive` says so; and all steps that were tried."""
+    tried, asked = [], []
+
+    def lump_survives(s, solver, config, dt, target):
+        tried.append(dt)
+        return survive(dt)
+
+    def block_limit(s, solver, config, own, precision, target):
+        asked.append((s, own, precision))
+        return Limit(block_dt, block_dt)
+
+    monkeypatch.setattr(limits, "lump_survives", lump_survives)
+    monkeypatch.setattr(limits, "block_limit", block_limit)
+    monkeypatch.setattr(limits, "default_dt", lambda *_: (1.0, "acoustic"))
+    monkeypatch.setattr(stability, "opening", lambda *_: opening)
+    task = point_tasks(BEAD, choose(["density"]), [method], quick, Target())[1][1]
+    return measure_point(task), tried, asked
+
+
+def test_a_point_is_bracketed_around_the_methods_own_step(monkeypatch):
+    row, tried, asked = point(monkeypatch, survive=lambda dt: None if dt <= 4.0 else "boom")
+    assert (row["verdict"], row["reason"], row["binding"], row["dt_own_s"]) == ("held", "", "acoustic", 1.0)
+    assert row["axis"] == "density" and row["method"] == "mpm" and row["value"] == 1e3
+    assert row["dt_lump_s"] <= 4.0 < 1.2 * row["dt_lump_s"] and row["lump_limit_found"] is True
+    assert row["dt_block_s"] == 0.5 and asked[0][1:] == (1.0, 0.2) and asked[0][0].spacing == BEAD.spacing
+    assert asked[0][0].numerics == BEAD.numerics and asked[0][0].material.yield_stress is None
+    assert tried[:2] == [1.0, 1.0] and max(tried) <= 8.0
+    assert row["dt_theory_s"] == pytest.approx(theory("mpm", BEAD, get_solver("mpm").Config(**BEAD.numerics["mpm"])))
+    beyond, tried, _ = point(monkeypatch)
+    assert beyond["lump_limit_found"] is False and beyond["dt_lump_s"] == pytest.approx(1.5**5) and len(tried) == 7
+
+
+def test_a_point_that_fails_says_why_and_a_full_study_looks_at_the_opening(monkeypatch):
+    row, *_ = point(monkeypatch, survive=lambda dt: None if dt < 0.5 else "boom")
+    assert (row["verdict"], row["reason"]) == ("failed", "boom") and 0.4 < row["dt_lump_s"] < 0.5
+    row, _, asked = point(monkeypatch, quick=False, opening="late")
+    assert (row["verdict"], row["reason"], asked[0][2]) == ("failed", "late", 0.05)
+    assert point(monkeypatch, opening="late")[0]["verdict"] == "held"
+    assert point(monkeypatch, quick=False)[0]["verdict"] == "held"
+
+
+def test_pbd_is_tried_at_eight_steps_once(monkeypatch):
+    row, tried, asked = point(monkeypatch, "pbd")
+    assert tried == [1.0, 8.0] and row["dt_lump_s"] == 8.0 and row["lump_limit_found"] is False and not asked
+    row, tried, _ = point(monkeypatch, "pbd", survive=lambda dt: "boom" if dt > 1 else None)
+    assert row["dt_lump_s"] == 1.0 and row["lump_limit_found"] is True and "dt_block_s" not in row
+    assert row["dt_theory_s"] is None
+
+
+def test_a_point_that_makes_no_scenario_or_is_refused_says_so():
+    task = point_tasks(scenario(), choose(["exit_speed"]), ["mpm"], True, Target())[0][1]
+    assert measure_point(task)["reason"] == "nozzle.exit_speed: the scenario has no nozzle"
+    assert measure_point(task)["verdict"] == "refused"
+
+
+def test_crashes_are_rows_with_their_reason(monkeypatch):
+    results = [{"crash": "it died"}, {"axis": "density", "value": 1.0}]
+    seen = []
+
+    def run_tasks(tasks, function, store, workers, done):
+        for i, r in enumerate(results):
+            done(i, r)
+        return results
+
+    monkeypatch.setattr(stability, "run_tasks", run_tasks)
+    tasks = point_tasks(BEAD, choose(["density"]), ["mpm"], True, Target())[:2]
+    rows = measure_points(tasks, None, 1, lambda i, r: seen.append(r["value"]))
+    assert rows[0] == {"axis": "density", "value": 10.0, "method": "mpm", "verdict": "error", "reason": "it died"}
+    assert rows[1] == results[1] and seen == [10.0, 1.0]
+    blocks = measure_blocks(block_tasks(["mpm"], True, Target())[:2], None, 1, lambda *_: None)
+    assert blocks == [{"kind": "acoustic", "method": "mpm", "reason": "it died"}, results[1]]
+
+
+def test_a_block_is_measured_bare(monkeypatch):
+    asked = []
+
+    def block_limit(s, solver, config, own, precision, target):
+        asked.append((s, config, own, precision))
+        return Limit(0.04, 0.09)
+
+    monkeypatch.setattr(limits, "block_limit", block_limit)
+    for label, task in block_tasks(["mpm", "sph"], True, Target()):
+        row, (s, config, own, precision) = measure_block(task), asked[-1]
+        solver = get_solver(task["method"])
+        assert config == solver.Config(**BARE.get(task["method"], {})) and (s.spacing, precision) == (0.01, 0.1), label
+        assert row["dt_limit_s"] == pytest.approx(0.06) and row["dt_own_s"] == own == default_dt(s, solver, config)[0]
+        assert row["dt_theory_s"] == theory(task["method"], s, config) and row["kind"] == task["kind"]
+
+
+def test_findings_count_and_compare():
+    blocks = [{"kind": "acoustic", "method": "mpm", "dt_limit_s": 3.0, "dt_theory_s": 4.0, "dt_own_s": 1.5},
+              {"kind": "viscous", "method": "sph", "reason": "it died"}]  # fmt: skip
+    points = [
+        {"axis": "density", "method": "mpm", "value": v, "verdict": w, "reason": r, "dt_own_s": dt, "binding": "b"}
+        for v, w, r, dt in ((1.0, "held", "", 4.0), (2.0, "failed", "boom", 1.0), (3.0, "held", "", 2.0))
+    ]  # fmt: skip
+    points += [{"axis": "spacing", "method": "sph", "value": 1.0, "verdict": "refused", "reason": "no"},
+               {"axis": "spacing", "method": "mpm", "value": 1.0, "verdict": "held", "reason": "", "dt_own_s": 3.0},
+               {"axis": "spacing", "method": "mpm", "value": 2.0, "verdict": "held", "reason": "", "dt_own_s": 4.4}]  # fmt: skip
+    assert findings(points, blocks) == [
+        "mpm, acoustic block: stable up to dt = 3 s, 0.75 of theory; the method's own bound is 0.50 of what was measured.",
+        "sph, viscous block: error: it died.",
+        "Default steps: 6 points tried, 4 held, 1 refused, 1 failed.",
+        "mpm: density narrows the step 4-fold, from 4 s at 1 to 1 s at 2 (bound: b).",
+        "mpm: spacing from 1 to 2 leaves the step as it is.",
+        "mpm, density = 2: failed: boom.",
+        "sph, spacing = 1: refused: no.",
+    ]
+    points[-1] |= {"dt_own_s": 4.5}
+    points[-2] |= {"binding": "c"}
+    points[3]["verdict"] = "error"
+    lines = findings(points, [])
+    assert lines[0] == "Default steps: 6 points tried, 4 held, 0 refused, 1 failed, 1 could not be measured."
+    assert "mpm: spacing narrows the step 1.5-fold, from 4.5 s at 2 to 3 s at 1 (bound: c)." in lines
