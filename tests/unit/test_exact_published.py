@@ -1,0 +1,101 @@
+"""Known answers as they are published: the csv, the markdown, the lines, profiles and work-precision."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fluidbench.report import validation as page
+from fluidbench.study.case import Curve, Finding, Number
+from fluidbench.study.validate import write_results
+
+from .made import case, finished, trial
+
+LIMITED = case(tolerance=0.1, fine_tolerance=0.02, tolerances={"sph": 0.3})
+
+
+def known():
+    """A method at two spacings, one that timed out, and a law."""
+    of = case("drop", tolerance=0.1, causes={"mpm": "a|b"})
+    rows = [trial(of, "mpm", 0.0421, wall=3.0), trial(of, "mpm", 0.168, wall=1.0, spacing=0.02, verdict="MISS", note="a|b"),
+            trial(of, "sph", verdict="timeout", note="slow"),
+            trial(case("law", "numerics", drive=lambda dt: None), "law", 1e-7)]  # fmt: skip
+    machine = {
+        "time": "2026-01-02T03:04:05",
+        "fluidbench": "0.1",
+        "warp": "1.9",
+        "python": "3",
+        "device": "CPU",
+        "cores": "2",
+    }
+    rows[0].runs["a"].record["machine"] = machine
+    return rows
+
+
+def test_known_answers_are_published_as_they_were_found(tmp_path):
+    lines = page.write_answers(known(), tmp_path).read_text().splitlines()
+    assert lines[0].endswith("as OUT/known_answers.csv; 2026-01-02, fluidbench 0.1, CPU.")
+    assert lines[1:] == [
+        "case,physics,method,spacing_m,particles,error,tolerance,verdict,wall_s,wall_per_simulated_s",
+        "drop,liquid,mpm,0.01,10,0.0421,0.1,pass,3,6",
+        "drop,liquid,mpm,0.02,10,0.168,0.2,MISS,1,2",
+    ]
+
+
+def test_the_published_table_has_a_row_a_trial(tmp_path):
+    text = page.write_markdown(known(), tmp_path).read_text()
+    assert "2026-01-02, fluidbench 0.1, Warp 1.9, Python 3, CPU (2 cores)." in text
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    assert rows[0] == ["case", "physics", "method", "spacing [m]", "particles", "error", "tolerance", "order",
+                       "wall s / sim. s", "verdict", "measure", "source"]  # fmt: skip
+    end = ["relative", "a book"]
+    assert rows[2:] == [
+        ["drop", "liquid", "mpm", "0.01", "10", "0.0421", "0.1", "2.00 (2)", "6", "pass", *end],
+        ["drop", "liquid", "mpm", "0.02", "10", "0.168", "0.2", "2.00 (2)", "2", "MISS", *end],
+        ["drop", "liquid", "sph", "0.01", "0", "-", "0.1", "-", "-", "timeout", *end],
+        ["law", "numerics", "law", "0.01", "10", "1e-07", "0.1", "-", "2", "pass", *end],
+    ]
+    assert "- drop, sph: timeout: slow" in text and "2 pass, 1 MISS, 1 timeout; order:" in text
+    escaped = known()
+    object.__setattr__(escaped[0].case, "measure", "|x|")
+    assert "\\|x\\|" in page.write_markdown(escaped, tmp_path).read_text()
+
+
+def test_a_line_says_error_tolerance_and_note():
+    first, second, third, _ = known()
+    assert page.line(first).split() == ["drop", "mpm", "d", "=", "0.01", "error", "0.0421", "of", "0.1", "pass"]
+    assert page.line(second).endswith("MISS  (a|b)") and "error         - of" in page.line(third)
+
+
+def test_results_are_written_with_their_numbers(tmp_path):
+    rows = known()[:1]
+    rows[0].finding = Finding(0.1, (Number("height", 1.0, 2.0),))
+    rows[0].runs = {"a": finished(folder=tmp_path / "runs" / "x")}
+    write_results(rows, tmp_path)
+    import json
+
+    (made,) = json.loads((tmp_path / "validate.json").read_text())
+    assert made["numbers"] == [{"quantity": "height", "measured": 1.0, "reference": 2.0}]
+    assert made["runs"] == {"a": "runs/x"} and made["error"] == 0.1
+    assert page._numbers(rows).rows == [["height", "mpm", "0.01", "1", "2"]]
+
+
+def test_profiles_are_of_the_finest_and_work_precision_goes_by_cost():
+    rows = known()
+    for i, t in enumerate(rows[:2]):
+        t.finding = Finding(t.error, (), (Curve("u of z", "z", "u", np.array([float(i)]), np.array([9.0]), np.array([5.0]),
+                                                np.array([6.0])),))  # fmt: skip
+    (plot,) = page.profiles(rows[:3])
+    assert [(t.label, list(t.x)) for t in plot.traces] == [("reference", [5.0]), ("mpm", [0.0])]
+    (line,) = page.work_precision(rows[:3]).traces
+    assert (list(line.x), list(line.y)) == ([1.0, 3.0], [0.168, 0.0421])
+
+
+@pytest.mark.parametrize(
+    ("verdict", "fine"), [("pass", True), ("exempt", True), ("skipped", True), ("MISS", False), ("error", False)]
+)
+def test_a_validation_ends_well_when_nothing_missed(verdict, fine, tmp_path, monkeypatch):
+    for name in ("write_results", "write_markdown", "write_answers", "write_page", "show"):
+        monkeypatch.setattr(page, name, lambda *_: None)
+    quiet = SimpleNamespace(print=lambda *_, **__: None)
+    assert page.present([trial(case(), "mpm"), trial(case(), "sph", verdict=verdict)], tmp_path, quiet) is fine

@@ -1,0 +1,157 @@
+"""Known answers as they are planned, limited, judged and published, by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fluidbench.study import validate as module
+from fluidbench.study.case import Finding, Run, cases, select
+from fluidbench.study.validate import LEVELS, Trial, evaluate, evaluate_law, orders, plan, tidy
+from fluidbench.target import Target
+from fluidbench.verdict import Evidence
+
+from ..conftest import scenario
+from .made import case, finished, trial
+
+LIMITED = case(tolerance=0.1, fine_tolerance=0.02, tolerances={"sph": 0.3})
+
+
+@pytest.mark.parametrize(
+    ("method", "factor", "limit"),
+    [
+        ("mpm", 1.0, 0.1), ("mpm", 1.5, 0.15), ("mpm", 2.0, 0.2), ("mpm", 2 / 3, 0.1), ("mpm", 0.51, 0.1),
+        ("mpm", 0.5, 0.02), ("mpm", 0.25, 0.02), ("sph", 0.5, 0.3), ("sph", 1.0, 0.3), ("sph", 1.5, 0.45),
+    ],
+)  # fmt: skip
+def test_a_tolerance_grows_with_the_spacing_and_has_a_fine_end(method, factor, limit):
+    assert LIMITED.limit(method, factor) == pytest.approx(limit)
+    assert trial(LIMITED, method, spacing=factor * LIMITED.spacing).tolerance == pytest.approx(limit)
+    assert case(tolerance=0.1).limit("mpm", 0.5) == 0.1
+
+
+def test_levels_are_factors_on_the_coarse_spacing():
+    assert {"rough": 1.5, "coarse": 1.0, "medium": pytest.approx(2 / 3), "fine": 0.5} == LEVELS
+
+
+def test_a_trial_says_what_it_is_evidence_of():
+    of = case()
+    states = {"pass": Evidence.RESULT, "MISS": Evidence.RESULT, "diverged": Evidence.INSTABILITY,
+              "error": Evidence.NOTHING, "skipped": Evidence.NOTHING}  # fmt: skip
+    assert {v: trial(of, "mpm", verdict=v).evidence for v in states} == states
+    assert not trial(of, "mpm", verdict="skipped").judged and trial(of, "mpm", verdict="error").judged
+    assert trial(of, "mpm", 0.25).error == 0.25 and math.isnan(trial(of, "mpm", verdict="error").error)
+    assert trial(of, "mpm", spacing=0.0123).name == "any, mpm, d = 12.3 mm"
+
+
+def scenarios(spacing):
+    return {"a": scenario(spacing=spacing), "b": scenario(spacing=spacing, seed=1)}
+
+
+def test_trials_are_planned_at_every_level():
+    full = case(scenarios=scenarios, quick=0.02, skipped={"pbd": "why not"}, exempt={"sph": "not expected"})
+    made = plan([full], ["mpm", "sph", "pbd"], ["coarse", "medium"], False, Target(), 5.0)
+    assert [(t.method, t.level, t.spacing) for t in made] == [
+        (m, level, pytest.approx(d)) for level, d in (("coarse", 0.01), ("medium", 0.01 / 1.5)) for m in ("mpm", "sph", "pbd")
+    ]  # fmt: skip
+    assert (made[2].verdict, made[2].note, made[2].jobs) == ("skipped", "why not", {})
+    first = made[0].jobs
+    assert list(first) == ["a", "b"] and first["b"].scenario["seed"] == 1 and first["a"].keep_frames
+    assert first["a"].wall_limit == 5.0 and first["a"].scenario["spacing"] == pytest.approx(0.01)
+    (quick,) = plan([full, case("c", scenarios=scenarios)], ["mpm", "sph", "pbd"], ["coarse"], True, Target(), None)
+    assert (quick.method, quick.level, quick.spacing) == ("mpm", "quick", 0.02)
+    law = case("law", drive=lambda dt: Finding(dt), quick=0.5)
+    (driven,) = plan([law], ["mpm", "sph"], ["coarse"], False, Target(), None)
+    assert (driven.method, driven.spacing, driven.jobs) == ("law", 0.01, {})
+    assert plan([law], ["mpm"], ["coarse"], True, Target(), None)[0].spacing == 0.5
+
+
+def judged(error, of=LIMITED, method="mpm"):
+    made = trial(of, method, error)
+    module._judge(made)
+    return made.verdict, made.note
+
+
+def test_an_answer_passes_is_exempt_or_misses_with_its_cause():
+    assert judged(0.1) == ("pass", "") and judged(0.100001) == ("MISS", "no cause known")
+    told = case(exempt={"sph": "not expected"}, causes={"mpm": "the grid"})
+    assert judged(0.2, told) == ("MISS", "the grid") and judged(0.2, told, "sph") == ("exempt", "not expected")
+    assert judged(0.1, told, "sph") == ("pass", "") and judged(math.nan, told) == ("MISS", "the grid")
+
+
+def ended(*runs, of=None):
+    made = Trial(of or case(evaluate=lambda found: Finding(len(found) / 100)), "mpm", "coarse", 0.01)
+    made.runs = {str(i): r for i, r in enumerate(runs)}
+    made.jobs = dict.fromkeys(made.runs)
+    return made
+
+
+def whole(tmp_path, **cost):
+    made = finished(input=scenario().model_dump(mode="json"), folder=tmp_path)
+    made.record["cost"] |= {"simulated_s": 2.0, "substeps": 5, "peak_particles": 7, "wall_s": 3.0, "cpu_s": 4.0} | cost
+    return made
+
+
+def test_a_trial_sums_what_its_runs_cost(tmp_path):
+    made = ended(whole(tmp_path), whole(tmp_path, peak_particles=9, simulated_s=1.0, wall_s=6.0))
+    evaluate(made)
+    assert (made.verdict, made.error) == ("pass", 0.02)
+    assert made.cost == {"particles": 9, "substeps": 10, "wall_s": 9.0, "cpu_s": 8.0, "wall_per_simulated_s": 3.0}
+
+
+def test_a_failed_run_fails_its_trial_and_a_crash_goes_before_a_blow_up(tmp_path):
+    blown, crashed = finished(verdict="diverged", reason="x"), finished(verdict="error", reason="y")
+    for runs, verdict in (
+        ((whole(tmp_path), blown), "diverged"),
+        ((blown, crashed), "error"),
+        ((crashed, blown), "error"),
+    ):
+        made = ended(*runs)
+        evaluate(made)
+        assert (made.verdict, made.note) == (verdict, {"diverged": "x", "error": "y"}[verdict]) and made.finding is None
+    assert made.cost["particles"] == 0 and math.isnan(made.cost["wall_per_simulated_s"])
+
+
+def test_an_evaluation_that_fails_is_an_error_of_its_own(tmp_path):
+    made = ended(whole(tmp_path), of=case(evaluate=lambda found: 1 / 0))
+    evaluate(made)
+    assert made.verdict == "error" and made.note == "its evaluation failed: ZeroDivisionError: division by zero"
+
+
+def test_a_law_is_driven_at_its_step():
+    made = Trial(case(drive=lambda dt: Finding(3 * dt)), "law", "coarse", 0.01)
+    evaluate_law(made)
+    assert (made.verdict, made.error, made.cost["particles"]) == ("pass", 0.03, 1) and made.cost["wall_s"] >= 0
+
+
+def test_a_run_shows_its_frames_in_order_of_time(tmp_path):
+    for i, t in enumerate((0.0, 0.5, 2.0)):
+        np.savez(tmp_path / f"frame_{i:04d}.npz", time=t, mass=np.array([i]))
+    run = Run(whole(tmp_path, mean_dt_s=0.25))
+    assert run.times.tolist() == [0.0, 0.5, 2.0] and run.dt == 0.25 and run.method == "mpm"
+    assert [int(run.near(t)["mass"][0]) for t in (0.2, 0.3, 1.2, 1.3, 9.0, -1.0)] == [0, 1, 1, 2, 2, 0]
+    assert run.scenario == scenario()
+
+
+def test_cases_are_chosen_by_name_in_order_of_physics():
+    assert [c.name for c in select(["slump_slip", "free_fall"])] == ["slump_slip", "free_fall"]
+    assert select([]) == list(cases().values())
+    order = list(dict.fromkeys(c.physics for c in cases().values()))
+    assert order == [p for p in ("kinematics", "emission", "liquid", "viscous", "yield stress", "elastic", "viscoelastic",
+                                 "process", "numerics") if p in order]  # fmt: skip
+
+
+def test_orders_are_of_every_case_and_method_with_two_spacings():
+    a, b = case("a"), case("b")
+    rows = [trial(a, "mpm", 0.4 * h**1.5, spacing=h) for h in (1.0, 0.5, 0.25)]
+    rows += [trial(a, "sph", e, spacing=h) for h, e in ((1.0, 0.2), (0.5, 0.1))]
+    rows += [trial(b, "mpm", 0.1), trial(a, "pbd", 0.0, spacing=1.0), trial(a, "pbd", 0.1, spacing=0.5),
+             trial(b, "sph", verdict="error")]  # fmt: skip
+    assert orders(rows) == {("a", "mpm"): (pytest.approx(1.5), 3), ("a", "sph"): (pytest.approx(1.0), 2)}
+    table = tidy(rows).to_dict("records")
+    assert table[0] | {"order": 1.5} == table[0] | {
+        "case": "a", "physics": "liquid", "method": "mpm", "level": "coarse", "spacing_m": 1.0, "error": 0.4,
+        "tolerance": pytest.approx(10.0), "order": 1.5, "order_spacings": 3, "verdict": "pass", "wall_s": 1.0,
+    }  # fmt: skip
+    assert table[0]["order"] == pytest.approx(1.5)
+    assert math.isnan(table[5]["order"]) and table[5]["order_spacings"] == 1
