@@ -1,0 +1,191 @@
+"""What a child leaves, what it cost, what a run needs and what it was made by."""
+
+import math
+import os
+import sys
+import types
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from fluidbench import child, needs, offspring, provenance, run
+from fluidbench.errors import Obstacle, UserError
+from fluidbench.run import Job
+from fluidbench.store import read_record
+from fluidbench.target import HERE, Target
+
+from ..conftest import scenario
+from .made import BEAD
+
+TABLE = BEAD.model_dump(mode="json")
+
+
+# --- what a child leaves
+
+
+def job_in(folder, **more):
+    folder.mkdir(exist_ok=True)
+    return Job(TABLE, "mpm", **more)
+
+
+@pytest.mark.parametrize(
+    ("code", "timed", "starved", "log", "words"),
+    [
+        (1, True, False, "x", "its process was stopped 120 s after the wall limit of 9 s; raise --wall-limit"),
+        (-9, False, True, "", "its process was killed (SIGKILL): the system ran out of memory"),
+        (-9, False, False, "", "its process was killed (SIGKILL): by somebody, or by the system for its memory"),
+        (-11, False, False, "", "its process was killed (SIGSEGV): it touched memory that is not its own: please report it"),
+        (-99, False, False, "", "its process was killed (signal 99)"),
+        (3, False, False, "a\nb\n", "its process ended with code 3: b"),
+        (3, False, False, "", "its process ended with code 3: no message"),
+        (0, False, False, "a", "its process left no whole record: a"),
+    ],
+)  # fmt: skip
+def test_a_post_mortem_says_why(tmp_path, code, timed, starved, log, words):
+    (tmp_path / "log.txt").write_text(log)
+    job = Job(TABLE, "mpm", wall_limit=9.0)
+    record = run._post_mortem(job, tmp_path, code, timed, starved)
+    assert record["reason"] == words and record["verdict"] == ("timeout" if timed else "error")
+    assert read_record(tmp_path)[0] == record and record["key"] == job.key
+
+
+def test_killings_for_want_of_memory_are_counted(tmp_path, monkeypatch):
+    (tmp_path / "events").write_text("low 0\noom_kill 3\n")
+    monkeypatch.setattr(run, "OOM_COUNTERS", (tmp_path / "none", tmp_path / "events"))
+    assert run._oom_kills() == 3
+    (tmp_path / "events").write_text("low 0\n")
+    assert run._oom_kills() == 0
+    monkeypatch.setattr(run, "OOM_COUNTERS", ())
+    assert run._oom_kills() == 0
+
+
+def launched(tmp_path, monkeypatch, script, **more):
+    """Launch a child of Python that is given the folder and runs this script."""
+    monkeypatch.setattr(run, "command", lambda module, folder, flag: [sys.executable, "-c", script, folder, flag])
+    job, told = Job(TABLE, "mpm", **more), []
+    return job, told, lambda: run.launch(job, tmp_path / "run", told.append)
+
+
+def test_a_child_reports_progress_and_leaves_its_record(tmp_path, monkeypatch):
+    script = (
+        "import sys, json; sys.path.insert(0, %r); from fluidbench.store import write_record; from pathlib import Path\n"
+        "folder = Path(sys.argv[1]); table = json.loads((folder / 'job.json').read_text())\n"
+        "print('@progress {\"time\": 0.5}'); print('hello'); assert sys.argv[2] == '--attended'\n"
+        "write_record(folder, {'verdict': 'completed', 'repeat': table['repeat']})" % str(Path(run.__file__).parents[1])
+    )
+    (tmp_path / "run").mkdir()
+    for name in ("record.json", "series.parquet", "final.npz", "log.txt"):
+        (tmp_path / "run" / name).write_text("of an earlier run")
+    _, told, launch = launched(tmp_path, monkeypatch, script, repeat=4)
+    record = launch()
+    assert (record["verdict"], record["repeat"]) == ("completed", 4) and told == [{"time": 0.5}]
+    assert (tmp_path / "run" / "log.txt").read_text() == "hello\n"
+    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["job.json", "log.txt", "record.json"]
+    _, _, launch = launched(tmp_path, monkeypatch, script + "; sys.exit(3)")
+    assert launch()["reason"].startswith("its process ended with code 3")
+
+
+def test_a_child_that_meets_an_obstacle_or_takes_too_long(tmp_path, monkeypatch):
+    *_, launch = launched(tmp_path, monkeypatch, "print('@obstacle the disk is full ')")
+    with pytest.raises(Obstacle, match="^the disk is full$"):
+        launch()
+    monkeypatch.setattr(run, "GRACE", 0.1)
+    *_, launch = launched(tmp_path, monkeypatch, "import time; time.sleep(60)", wall_limit=0.1)
+    assert launch()["verdict"] == "timeout"
+
+
+def pictured(cost=None, **outcome):
+    """Cost of a run that took 4 s for 2 s in 10 substeps."""
+    usual = {"time": 2.0, "wall": 4.0, "cpu": 5.0, "prepare_wall": 0.5, "substeps": 10, "particle_substeps": 600,
+             "peak_particles": 70}  # fmt: skip
+    made = SimpleNamespace(footprint=lambda: {"a": 300, "b": 340}, pool=SimpleNamespace(size=64),
+                           scene=SimpleNamespace(device=SimpleNamespace(is_cpu=True)))  # fmt: skip
+    return child.cost(SimpleNamespace(**usual | outcome), made, 9.0)
+
+
+def test_cost_is_of_the_loop_alone(monkeypatch):
+    monkeypatch.setattr(child, "peak_memory", lambda: 3.0 * 2**20)
+    assert pictured() == {
+        "simulated_s": 2.0, "wall_s": 4.0, "cpu_s": 5.0, "prepare_s": 0.5, "total_s": 9.0, "substeps": 10,
+        "mean_dt_s": 0.2, "steps_per_s": 2.5, "particle_substeps_per_s": 150.0, "particle_substeps_per_cpu_s": 120.0,
+        "wall_per_simulated_s": 2.0, "simulated_to_real": 0.5, "peak_particles": 70, "bytes_per_particle": 10.0,
+        "peak_memory_MiB": 3.0,
+    }  # fmt: skip
+    nothing = pictured(time=0.0, wall=0.0, cpu=0.0, substeps=0, particle_substeps=0)
+    assert nothing["mean_dt_s"] == nothing["steps_per_s"] == nothing["simulated_to_real"] == 0.0
+    assert nothing["wall_per_simulated_s"] == pytest.approx(1e3) and nothing["wall_s"] == 0.0  # a billionth of a second
+
+
+def test_peak_memory_is_in_bytes(monkeypatch):
+    import resource
+
+    monkeypatch.setattr(resource, "getrusage", lambda who: SimpleNamespace(ru_maxrss=5))
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert child.peak_memory() == 5 * 1024.0
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert child.peak_memory() == 5.0
+
+
+# --- what a run needs, and what made it
+
+
+@pytest.mark.parametrize(("free", "fits"), [(300 * 2**20 + 1000 * 2500, True), (300 * 2**20 + 1000 * 2500 - 1, False)])
+def test_a_run_needs_a_process_and_its_particles(monkeypatch, free, fits):
+    s = scenario(pool=1000)
+    monkeypatch.setattr(needs, "available_memory", lambda target: float(free))
+    solver = SimpleNamespace(typical_bytes=2500.0)
+    why = needs.shortage(s, solver, HERE)
+    assert (why is None) is fits
+    if why:
+        assert why.startswith(
+            "it needs about 0.295 GiB (1000 particles of some 2500 bytes), and this machine has 0.295"
+        )
+    monkeypatch.setattr(needs, "available_memory", lambda target: None)
+    assert needs.shortage(s, solver, HERE) is None
+
+
+@pytest.mark.parametrize(
+    ("limit", "used", "left"), [(9.0, 4.0, 5.0), (90.0, 4.0, 7.0), (None, 4.0, 7.0), (9.0, None, 7.0)]
+)
+def test_memory_is_what_host_and_control_group_leave(monkeypatch, limit, used, left):
+    psutil = types.ModuleType("psutil")
+    psutil.virtual_memory = lambda: SimpleNamespace(available=7)
+    monkeypatch.setitem(sys.modules, "psutil", psutil)
+    monkeypatch.setattr(needs, "_cgroup", {"memory.max": limit, "memory.current": used}.get)
+    assert needs.available_memory(HERE) == left
+
+
+def test_a_target_in_words_and_its_other_backend():
+    assert (HERE.suffix, HERE.options) == ("", "") and Target(backend="taichi", threads=3).suffix == " (taichi)"
+    assert Target("cuda:0", "taichi").options == " --device cuda:0 --backend taichi"
+    assert Target(backend="taichi", threads=3).options == " --backend taichi --threads 3"
+    assert Target(threads=4).threads == 1 == Target("cuda:0", "taichi", 4).threads
+    assert HERE.other == Target(backend="taichi") and Target(backend="taichi", threads=3).other == HERE
+    with pytest.raises(UserError, match="runs on cuda:0 alone"):
+        Target("cuda:1", "taichi")
+    Target("cuda:1", "warp")
+
+
+def test_children_find_our_code_before_the_users(monkeypatch, tmp_path):
+    own, standard = str(Path(offspring.__file__).parents[1]), os.path.realpath(os.path.dirname(os.__file__))
+    monkeypatch.setattr(sys, "path", ["", str(tmp_path), "/x/site-packages", own, standard, f"{standard}/lib-dynload",
+                                      "/y/python311.zip", str(tmp_path)])  # fmt: skip
+    found = offspring.search_path()
+    assert found == [standard, f"{standard}/lib-dynload", "/y/python311.zip", own, "/x/site-packages", str(tmp_path)]
+    monkeypatch.setenv("PYTHONPATH", "/elsewhere")
+    monkeypatch.setenv("KEPT", "1")
+    seen = offspring.environment()
+    assert "PYTHONPATH" not in seen and seen["PYTHONSAFEPATH"] == "1" and seen["KEPT"] == "1"
+    made = offspring.command("a.b", "c", "d")
+    assert made[0] == sys.executable and made[1:3] == ["-P", "-c"] and made[-3:] == ["a.b", "c", "d"]
+    assert made[-5:-3] == [os.pathsep, os.pathsep.join(found)]
+
+
+def test_what_a_run_was_made_by():
+    found = provenance.hardware(HERE)
+    assert list(found) == ["arch", "cores", "processor", "device"] and found["cores"] == str(os.cpu_count())
+    assert found["device"] == "CPU" and found["processor"] == provenance.processor() != ""
+    about = provenance.machine(Target(backend="taichi"))
+    assert about["backend_version"] == provenance.code("mpm", "taichi")["taichi"] and found.items() <= about.items()
+    assert math.isfinite(float(about["load"])) and len(provenance.code("mpm", "warp")["sources"]) == 16
