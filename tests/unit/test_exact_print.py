@@ -87,7 +87,9 @@ def test_what_lies_beyond_the_field_is_empty():
     half = Deposit(whole.origin, D, whole.fill[: len(whole.fill) // 2])
     heights = tower.path_heights(half, s)
     assert heights[:17] == pytest.approx(np.full(17, 18 * D)) and heights[20:] == pytest.approx(np.zeros(18))
-    late = Deposit(whole.origin + [70 * D, 0, 0], D, whole.fill[70:])
+    late = Deposit(whole.origin + [72 * D, 0, 0], D, whole.fill[72:])  # from the first column of sector 20 on
+    aside = Deposit(whole.origin + [0, 2 * D, 0], D, whole.fill[:, 2:])  # the path is over its first column
+    assert tower.path_heights(aside, s) == pytest.approx(np.full(38, 18 * D))
     heights = tower.path_heights(late, s)
     assert heights[:17] == pytest.approx(np.zeros(17)) and heights[20:] == pytest.approx(np.full(18, 18 * D))
 
@@ -106,10 +108,10 @@ def test_a_path_stands_from_three_quarters_of_the_plan(cells, stands):
 def test_progress_is_of_mass_outside_the_nozzle():
     cure = {"kind": "linear", "time": 1.0, "youngs_modulus": 1e5}
     s = wall(material={**PASTE, "cure": cure, "expansion": {"ratio": 4.0}})
-    made = frame(np.zeros((4, 3)), 0.0, [1.0, 2.0, 1.0, 6.0], [FREE, CLAMPED, FREE, CARRIED],
+    made = frame(np.zeros((4, 3)), 0.0, [1.0, 4.0, 1.0, 6.0], [FREE, CLAMPED, FREE, CARRIED],
                  phase=[95, 94, 100, 0], volume=[2e-3, 2e-3, 4e-3, 9.0])  # fmt: skip
     assert progress(made, s) == pytest.approx(
-        {"mean_cure": (95 + 188 + 100) / 400, "cured_share": 0.5, "volume_growth": 8e-3 * 1000.0 / 4.0}
+        {"mean_cure": (95 + 376 + 100) / 600, "cured_share": 1 / 3, "volume_growth": 8e-3 * 1000.0 / 6.0}
     )
     assert progress(made, wall()) == {} and progress(made | {"held": np.full(4, CARRIED)}, s) == {}
 
@@ -177,7 +179,7 @@ def test_every_condition_alone_and_the_worst_is_the_verdict(changes, verdict, un
 
 
 def test_criteria_say_what_was_measured_and_what_is_wanted():
-    _, criteria = judged(print_height_m=0.0135, print_standing=0.5, layer_2_continuity=0.7, after=(1.0, 0.8))
+    _, criteria = judged(print_height_m=0.0135, print_standing=0.5, layer_2_continuity=0.7, after=(2.0, 1.6))
     assert {name: (pytest.approx(c["measured"]), c["wanted"]) for name, c in criteria.items()} == {
         LAID: (3, "3"), "path travelled": (1.0, "1"), HEIGHT: (0.5, "1 ± 0.25"), STANDS: (0.5, ">= 0.95"),
         "continuity of the worst layer": (0.7, ">= 0.95"), "sunk after the last layer": (0.2, "<= 0.05"),

@@ -65,6 +65,8 @@ def test_answers_are_of_the_method_the_class_and_the_spacing_asked_for():
         ([10.0], [12.0], False),
         ([10.0], [12.001], True),
         ([10.0], [11.9], False),
+        ([10.0, 10.0], [11.0, 11.0], False),
+        ([0.01], [0.02], True),
         ([8.0, 12.0], [15.8, 19.8], False),  # deviations of sqrt(8): twice hypot is 8, the means are 7.8 apart
         ([8.0, 12.0], [16.2, 20.2], True),
         ([10.0], [15.5, 19.5], True),  # one alone has no spread: twice sqrt(8) is 5.66, and 7.5 is more

@@ -90,6 +90,8 @@ def test_stable_steps_that_were_not_found_place_nobody():
     assert cells[0].measured.startswith("largest stable dt not found")
     silent = stability(evidence(limits=rows, repeats={m: [finished(m, "error")] for m in METHODS}))
     assert silent[0].measured == "largest stable dt 0.50 and 0.50 d/c"
+    untold = {m: [{k: v for k, v in r.items() if k != "lump_limit_found"} for r in rs] for m, rs in rows.items()}
+    assert not any(">=" in c.measured for c in stability(evidence(limits=untold)))
     extra = stability(evidence(limits=rows | {"pbd": [*rows["pbd"], failed[1]]}))
     assert {c.verdict for c in extra} == {OPEN}
 
@@ -154,13 +156,13 @@ def test_a_step_collapses_when_it_shrinks_tenfold(monkeypatch):
 
     def steps(scenario, method, settings):
         seen.append((method, *settings.items()))
-        return {1e-3: 10.0, 1e3: 1.0, 0.0: 9.99, 1e4: 1.0}[next(iter(settings.values()))]
+        return {1e-3: 20.0, 1e3: 2.0, 0.0: 19.98, 1e4: 2.0}[next(iter(settings.values()))]
 
     monkeypatch.setattr(module, "bound_dt", steps)
     cells = {c.row: c for c in limits(evidence())}
     assert cells["limits: viscosity"].verdict == CONFIRMED and cells["limits: yield stress"].verdict == REFUTED
-    assert cells["limits: viscosity"].measured == "dt 10 s at 0.001 Pa s, 1 s at 1000: 10-fold"
-    assert cells["limits: yield stress"].measured == "dt 9.99 s at 0 Pa, 1 s at 10000: 9.99-fold"
+    assert cells["limits: viscosity"].measured == "dt 20 s at 0.001 Pa s, 2 s at 1000: 10-fold"
+    assert cells["limits: yield stress"].measured == "dt 20 s at 0 Pa, 2 s at 10000: 9.99-fold"
     assert [c.paper for c in cells.values() if c.rule == "collapse"] == ["high viscosity", "non-Newtonian"]
     assert seen == [("sph", ("material.viscosity", 1e-3)), ("sph", ("material.viscosity", 1e3)),
                     ("sph", ("material.yield_stress", 0.0)), ("sph", ("material.yield_stress", 1e4))]  # fmt: skip
@@ -189,5 +191,7 @@ def test_the_table_has_every_cell_and_says_nothing_where_nothing_ran():
         t.runs, t.note = {}, SHIPPED
     dead = evidence(rows, repeats={m: [finished(m, "error")] for m in METHODS})
     assert {c.verdict for c in table1(dead)} == {OPEN}
+    half = evidence(rows, repeats={m: [finished(m, "error"), finished(m)] for m in METHODS})
+    assert CONFIRMED in {c.verdict for c in table1(half)}
     blown = evidence(rows, repeats={m: [finished(m, "diverged")] for m in METHODS})
     assert CONFIRMED in {c.verdict for c in table1(blown)}

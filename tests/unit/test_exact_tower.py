@@ -52,6 +52,7 @@ def test_a_tower_has_several_layers_of_a_nozzle_that_moves():
     ("made", "margin", "count"),
     [
         (wall(0.2), 0.064, 38),  # (0.2 - 2 x 0.0128) / 4.5 mm = 38.76
+        (wall(0.11605), 0.0128 / 0.11605, 20),  # 20.1
         (wall(0.04), 0.25, 4),  # a quarter at either end; 20 mm
         (wall(0.04, spacing=6e-3), 0.25, 1),
         (wall(0.02, spacing=6e-3), 0.25, 1),  # shorter than a sector
@@ -111,7 +112,7 @@ def frame(position, birth, mass=1.0, held=FREE, **more):
 
 def test_material_is_of_the_layer_during_which_it_left_the_nozzle():
     """Layers of 2 s with a pause of 0.1 s between them; what leaves at the end of one is still of it."""
-    births = [0.5, 2.0, 2.05, 2.1 + 1e-6, 4.0, 4.3, 6.2]
+    births = [0.5, 2.0, 2.1, 2.1 + 1e-6, 4.0, 4.3, 6.2]
     made = frame(np.zeros((7, 3)), births)
     assert layer_of(made, wall()).tolist() == [0, 0, 0, 1, 1, 2, 2]
     assert layer_of(made | {"held": np.array([CARRIED, FREE, CLAMPED, CARRIED, FREE, FREE, FREE])}, wall()).tolist() == [
@@ -169,4 +170,10 @@ def test_material_counts_within_one_and_a_half_nozzles_of_what_it_has_become():
     foam = wall(material={**PASTE, "expansion": {"ratio": 8.0}})
     reach = 1.5 * DIAMETER
     for made, wide in ((wall(), reach), (foam, 2 * reach)):
-        assert [held_in_sectors(made, 1.0, side * wide) for side in (-0.999, 0.999, -1.001, 1.001)] == [1, 1, 0, 0]
+        assert [held_in_sectors(made, 1.0, side * wide) for side in (-0.999, 0.999, 1.0, -1.001, 1.001)] == [
+            1,
+            1,
+            1,
+            0,
+            0,
+        ]
