@@ -1,0 +1,102 @@
+"""Scenario files and overrides: what is found, merged and assigned, and which mistakes are told."""
+
+import pytest
+
+from fluidbench import library
+from fluidbench.errors import UserError, quoted, suggestion
+from fluidbench.library import assign, find, load, parse_override
+
+
+def test_a_file_is_found_by_name_or_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert find("line_bead").name == "line_bead.toml"
+    (tmp_path / "line_bead").write_text("")
+    assert find("line_bead").parent.name == "extrusion"  # the shipped one, unless it is called by its file's name
+    (tmp_path / "mine.toml").write_text("")
+    assert find("mine.toml").name == "mine.toml" and find(tmp_path / "mine.toml") == tmp_path / "mine.toml"
+    (tmp_path / "folder.toml").mkdir()
+    for wrong in ("none.toml", "folder.toml"):
+        with pytest.raises(UserError, match="no such scenario file"):
+            find(wrong)
+    with pytest.raises(UserError, match="is no file name"):
+        find("x" * 5000)
+
+
+def test_a_file_extends_a_bounded_number_of_others(tmp_path):
+    def chain(depth):
+        for i in range(depth - 1):
+            (tmp_path / f"f{i}.toml").write_text(f'extends = "f{i + 1}.toml"\n')
+        (tmp_path / f"f{depth - 1}.toml").write_text(library.find("line_bead").read_text())
+        return load(tmp_path / "f0.toml")
+
+    assert chain(32).spacing == 1.5e-3 and chain(3).name == "f0"
+    with pytest.raises(UserError, match="extends more than 32 files deep"):
+        chain(33)
+
+
+def test_a_file_is_of_bounded_size(tmp_path):
+    text = library.find("line_bead").read_text()
+    path = tmp_path / "big.toml"
+    path.write_text(text + "#" * (2**20 - len(text.encode())))
+    assert path.stat().st_size == 2**20 and load(path).spacing == 1.5e-3
+    path.write_text(path.read_text() + "#")
+    with pytest.raises(UserError, match="1048577 bytes are no scenario; 1048576 at most"):
+        load(path)
+
+
+def test_quick_takes_the_files_own_table_or_a_third_more_spacing(tmp_path):
+    text = library.find("line_bead").read_text()
+    (tmp_path / "own.toml").write_text(text + "\n[quick]\nduration = 1.5\n[quick.material]\ndensity = 7.0\n")
+    own = load(tmp_path / "own.toml", quick=True)
+    assert (own.duration, own.material.density, own.material.yield_stress, own.spacing) == (1.5, 7.0, 60.0, 1.5e-3)
+    assert load(tmp_path / "own.toml").duration == 1.05
+    assert load("line_bead", {"spacing": 1e-3}, quick=True).spacing == 1e-3
+    (tmp_path / "bad.toml").write_text("quick = 3\n" + text)
+    with pytest.raises(UserError, match="quick: a table is wanted"):
+        load(tmp_path / "bad.toml")
+
+
+def test_overrides_are_toml_or_words():
+    given = {"a=1": ("a", 1), "a.b = 2.5": ("a.b", 2.5), "a=true": ("a", True), "a=[1, 2]": ("a", [1, 2]), "a=x y": ("a", "x y"),
+             "a='x'": ("a", "x"), "a=none": ("a", None), "a= none ": ("a", None), "a=b=c": ("a", "b=c")}  # fmt: skip
+    assert {text: parse_override(text) for text in given} == given
+    for text in ("a", "=3", " =3"):
+        with pytest.raises(UserError, match="--set takes key=value"):
+            parse_override(text)
+    with pytest.raises(UserError, match="one key=value"):
+        parse_override("a=1\nb=2")
+
+
+def test_keys_reach_into_tables_and_lists():
+    table = {"a": {"b": 1}, "l": [{"x": 1}, 2]}
+    for key, value in (("a.b", 3), ("a.c.d", 4), ("l.0.x", 5), ("l.1", 6), ("e", 7)):
+        assign(table, key, value)
+    assert table == {"a": {"b": 3, "c": {"d": 4}}, "l": [{"x": 5}, 6], "e": 7}
+    assign(table, "a.b", None)
+    assign(table, "gone", None)
+    assert table == {"a": {"c": {"d": 4}}, "l": [{"x": 5}, 6], "e": 7}
+    for key, words in (("l.2", "must be a number below 2"), ("l.x.y", "must be a number below 2"), ("l.-1", "a number below 2"),
+                       ("e.x", "is a value, not a table"), ("a..b", "names joined by dots"), ("", "names joined by dots"),
+                       ("l." + "0" * 10, "a number below 2"), (".".join("k" * 34), "names joined by dots")):  # fmt: skip
+        with pytest.raises(UserError, match=words):
+            assign(table, key, 1)
+    assign(table, "l." + "0" * 9, 8)
+    assert table["l"][0] == 8
+    assign({}, ".".join("k" * 33), 1)
+
+
+def test_mistakes_are_told_five_at_a_time():
+    with pytest.raises(UserError) as error:
+        library.validate({f"wrong{i}": 1 for i in range(4)}, "here")
+    assert len(str(error.value).splitlines()) == 6 and str(error.value).endswith("here: and 3 more mistakes")
+    with pytest.raises(UserError) as error:
+        library.validate({"wrong": 1, "spacing": 1.0, "duration": 1.0, "material": {"density": 1.0}}, "here")
+    assert str(error.value).splitlines() == ["here: 'domain' is missing", "here: unknown key 'wrong'; known: " + ", ".join(
+        sorted(library.Scenario.model_fields))]  # fmt: skip
+    assert library._short("x" * 200) == "x" * 200 and library._short("x" * 201) == "x" * 200 + "..."
+
+
+def test_words_are_quoted_and_suggested():
+    assert quoted("x" * 58) == repr("x" * 58) and quoted("x" * 59) == "'" + "x" * 59 + "..."
+    assert suggestion("Viscocity", ["viscosity", "density"]) == "; did you mean 'viscosity'?"
+    assert suggestion("qqq", ["b", "a"]) == "; known: a, b" and suggestion("q", []) == ""
