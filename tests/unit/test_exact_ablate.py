@@ -242,6 +242,7 @@ def test_the_page_names_what_is_needed_and_the_leanest_mix(tmp_path):
         "fluidbench run line_bead --solver mpm --set seed=3 --set b=1",
         "sph: needed: nothing; droppable: nothing.",
     ]  # fmt: skip
+    assert [t.label for t in made.plots[0].traces] == ["mpm"] and len(made.data) == 5
     assert list(made.plots[0].traces[0].x) == pytest.approx([10.0, 25.0, 0.0])
     assert list(made.plots[0].traces[0].y) == pytest.approx([20.0, 1.0, 0.0])
 

@@ -3,6 +3,9 @@
 import math
 from dataclasses import replace
 
+import pytest
+
+from fluidbench.errors import UserError
 from fluidbench.study.compare import binding, jobs, lengths_of, tidy
 from fluidbench.study.evidence import METHODS
 from fluidbench.study.frameworks import frameworks
@@ -41,7 +44,8 @@ def test_every_place_of_cost_is_held_against_the_other_backend():
     assert {len(c.runs) for c in cells[:5]} == {12} and {c.rule for c in cells} == {"frameworks"}
     turned = both(here, repeated(mpm=1.0, sph=9.0, pbd=2.0))
     assert [c.verdict for c in turned[:5]] == [DIFFERS, HOLDS, DIFFERS, HOLDS, DIFFERS]
-    for other in (repeated(1, mpm=2.0, sph=9.0, pbd=1.0), repeated(mpm=2.0, sph=9.0), {}):
+    short = repeated(mpm=2.0, sph=9.0) | repeated(1, pbd=1.0)
+    for other in (short, repeated(1, mpm=2.0, sph=9.0, pbd=1.0), repeated(mpm=2.0, sph=9.0), {}):
         assert {c.verdict for c in both(here, other)} == {OPEN}
         assert {c.verdict for c in both(other or {"mpm": []}, here)} == {OPEN}
 
@@ -85,6 +89,8 @@ def test_a_comparison_is_every_method_backend_and_repeat_in_order():
     assert [(j.method, j.target.backend, j.repeat) for j in made] == [
         (m, b, r) for m in ("mpm", "sph") for b in ("warp", "taichi") for r in (0, 1)
     ]
+    with pytest.raises(UserError, match="unknown key"):
+        jobs(BEAD.model_copy(update={"numerics": {"mpm": {"x": 1}}}), ["mpm"], 1, [Target()])
     assert all(j.keep_frames and j.scenario == BEAD.model_dump(mode="json") for j in made)
 
 

@@ -1,5 +1,8 @@
 """Points of the study of stability: axes, tasks, what a point measures, and the findings."""
 
+import math
+from types import SimpleNamespace
+
 import pytest
 
 from fluidbench.errors import UserError
@@ -55,10 +58,58 @@ def test_tasks_are_every_axis_method_and_value():
     ] == 0.03
 
 
+def test_axes_go_by_decades_or_halves_of_them():
+    """Consecutive values, where they are not zero: a factor of 10 or 100, or 3 and 10 / 3 in turn."""
+    for name in ("viscosity", "youngs_modulus", "yield_stress", "density", "exit_speed"):
+        values = [v for v in AXES[name].values if v > 0]
+        steps = {round(b / a, 2) for a, b in zip(values[:-1], values[1:], strict=True)}
+        assert steps <= {10.0, 100.0, 3.0, 3.33} and values[0] == pytest.approx(10 ** round(math.log10(values[0])))
+    counts = AXES["particles_per_cell"].values
+    assert (
+        counts[0] == 1
+        and counts[-1] == 27
+        and [b / a for a, b in zip(counts[:3], counts[1:4], strict=True)] == [2.0] * 3
+    )
+    assert AXES["spacing"].values == pytest.approx((1 / 3, 1 / 2, 1, 2, 8 / 3))
+    assert AXES["poisson_ratio"].values == (0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499)
+
+
+@pytest.mark.parametrize(
+    ("ticks", "each", "trouble_at", "looked"), [(9, 1, None, 9), (9, 1999, None, 2), (9, 1000, None, 2), (9, 1, 3, 3)]
+)
+@pytest.mark.parametrize("kind", ["complaint", "fault"])
+def test_the_opening_is_two_thousand_substeps_or_all(monkeypatch, ticks, each, trouble_at, looked, kind):
+    class Opened:
+        def __init__(self, *_):
+            self.done, self.ticks, self.looks = 0, ticks, 0
+            made.append(self)
+
+        def advance(self):
+            self.done += 1
+            return SimpleNamespace(substeps=each)
+
+        def said(self, name):
+            return "boom" if name == kind and self.looks == trouble_at else None
+
+        def look(self):
+            self.looks += 1
+            return SimpleNamespace(complaint=self.said("complaint"))
+
+        def fault(self):
+            return self.said("fault")
+
+    made = []
+    monkeypatch.setattr("fluidbench.simulation.Simulation", Opened)
+    assert stability.opening(BEAD, "mpm", Target()) == ("boom" if trouble_at else None)
+    assert made[0].looks == looked == made[0].done
+
+
 def test_a_varied_scenario_changes_only_its_keys():
     table = bead(nozzle={"diameter": 0.012, "flow_rate": 1e-5, "standoff": 0.01}).model_dump(mode="json")
     changed = varied(table, {"nozzle.exit_speed": 0.2, "material.density": 7.0})
     assert (changed.nozzle.exit_speed, changed.nozzle.flow_rate, changed.material.density) == (0.2, None, 7.0)
+    kept = varied(table, {"material.density": 7.0}).nozzle
+    assert (kept.exit_speed, kept.flow_rate) == (None, 1e-5)
     assert varied(table, {}).model_dump(mode="json") == table
     with pytest.raises(UserError, match="the scenario has no nozzle"):
         varied(scenario().model_dump(mode="json"), {"nozzle.exit_speed": 1.0})
@@ -77,7 +128,7 @@ def test_a_block_of_the_scenarios_material_does_not_yield():
     assert block_material(oldroyd)["relaxation_time"] == 0.5 and "sound_speed" not in block_material(oldroyd)
 
 
-def point(monkeypatch, method="mpm", quick=True, survive=lambda dt: None, block_dt=0.5, opening=None):
+def point(monkeypatch, method="mpm", quick=True, survive=lambda dt: None, block_dt=0.5, opening=None, own=1.0):
     """A point of density whose lump comes through where `survive` says so; and all steps that were tried."""
     tried, asked = [], []
 
@@ -91,7 +142,7 @@ def point(monkeypatch, method="mpm", quick=True, survive=lambda dt: None, block_
 
     monkeypatch.setattr(limits, "lump_survives", lump_survives)
     monkeypatch.setattr(limits, "block_limit", block_limit)
-    monkeypatch.setattr(limits, "default_dt", lambda *_: (1.0, "acoustic"))
+    monkeypatch.setattr(limits, "default_dt", lambda *_: (own, "acoustic"))
     monkeypatch.setattr(stability, "opening", lambda *_: opening)
     task = point_tasks(BEAD, choose(["density"]), [method], quick, Target())[1][1]
     return measure_point(task), tried, asked
@@ -122,6 +173,7 @@ def test_a_point_that_fails_says_why_and_a_full_study_looks_at_the_opening(monke
 def test_pbd_is_tried_at_eight_steps_once(monkeypatch):
     row, tried, asked = point(monkeypatch, "pbd")
     assert tried == [1.0, 8.0] and row["dt_lump_s"] == 8.0 and row["lump_limit_found"] is False and not asked
+    assert point(monkeypatch, "pbd", own=0.5)[1] == [0.5, 4.0]
     row, tried, _ = point(monkeypatch, "pbd", survive=lambda dt: "boom" if dt > 1 else None)
     assert row["dt_lump_s"] == 1.0 and row["lump_limit_found"] is True and "dt_block_s" not in row
     assert row["dt_theory_s"] is None

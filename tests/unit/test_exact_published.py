@@ -91,6 +91,23 @@ def test_profiles_are_of_the_finest_and_work_precision_goes_by_cost():
     assert (list(line.x), list(line.y)) == ([1.0, 3.0], [0.168, 0.0421])
 
 
+def test_a_validation_writes_everything_and_tells_notes(tmp_path):
+    told = []
+    quiet = SimpleNamespace(print=lambda *words, **__: told.append(words[0]), width=120)
+    rows = known()
+    for run in (run for t in rows for run in t.runs.values()):
+        object.__setattr__(run, "folder", tmp_path / "runs" / "x")
+    assert page.present(rows, tmp_path, quiet) is False
+    written = {path.name for path in tmp_path.iterdir()}
+    assert {"validate.parquet", "validate.json", "validate.md", "known_answers.csv", "report.html"} <= written
+    assert [w for w in told if isinstance(w, str)][1:] == [
+        "drop mpm: MISS: a|b", "drop sph: timeout: slow", f"report: {tmp_path / 'report.html'}"
+    ]  # fmt: skip
+    html = (tmp_path / "report.html").read_text()
+    assert html.count("<h2 id=") == 2 and "error against cost" in html
+    assert len(list(tmp_path.glob("*work_precision.png"))) == 1  # of the case, not of the law
+
+
 @pytest.mark.parametrize(
     ("verdict", "fine"), [("pass", True), ("exempt", True), ("skipped", True), ("MISS", False), ("error", False)]
 )

@@ -235,6 +235,7 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
     for r in rows:
         if r.record["method"] == "mpm":
             r.record["measures"]["slump"] = 0.1 * r.record["spacing_m"]  # a length that the others do not have
+        r.record["measures"]["front_x_m"] = 1.0  # and one in which all agree
     found = assess(BEAD, ["mpm", "sph", "pbd"], rows)
     assert confidence(found, tolerance) == sure
     found.erratic.add("sph")

@@ -70,7 +70,7 @@ def test_what_half_the_error_takes():
     assert page._further(nothing, nothing.candidates[0]).endswith("nothing but what cannot be measured")
 
 
-def test_tables_and_plot_of_the_candidates():
+def test_tables_and_plot_of_the_candidates(tmp_path):
     found = made((1.0, 8.0, 0.1), (2.0, 4.0, 0.2), (4.0, 5.0, 0.4), bias=0.01)
     front = found.front()
     rows = page._candidates(found, front).rows
@@ -81,6 +81,11 @@ def test_tables_and_plot_of_the_candidates():
     dominated, best = page._plot(found, front).traces
     assert (list(dominated.x), list(dominated.y)) == ([5.0], [pytest.approx(41.0)])
     assert (list(best.x), list(best.y)) == ([4.0, 8.0], pytest.approx([21.0, 11.0]))
+    for c in found.candidates:
+        c.run.record.update(key="k", machine={"cores": "2"})
+        object.__setattr__(c.run, "folder", tmp_path / "runs" / "x")
+    data = page.report(BEAD, "line_bead", found, 0.2, *[math.inf] * 2, tmp_path).data
+    assert data["on_front"].tolist() == [True, True, False] and data["wall_s"].tolist() == [8.0, 4.0, 5.0]
     assert page._row(found.candidates[0], True) == {
         "method": "mpm", "spacing_m": 1.0, "mean_dt_s": 1e-4, "wall_s": 8.0, "wall_per_simulated_s": 80.0,
         "error": pytest.approx(0.11), "discretisation": 0.1, "bias": 0.01, "on_front": True,

@@ -155,3 +155,33 @@ def test_orders_are_of_every_case_and_method_with_two_spacings():
     }  # fmt: skip
     assert table[0]["order"] == pytest.approx(1.5)
     assert math.isnan(table[5]["order"]) and table[5]["order_spacings"] == 1
+
+
+def test_a_trial_is_judged_with_its_last_run(monkeypatch, tmp_path):
+    """Two trials of two runs each, in the order in which their runs end; laws and what is skipped at once."""
+    of = case(evaluate=lambda found: Finding(0.01 * len(found)), scenarios=scenarios)
+    rows = plan([of], ["mpm", "sph"], ["coarse"], False, Target(), 5.0)
+    law = case("law", drive=lambda dt: Finding(3 * dt))
+    rows += plan([law], [], ["coarse"], False, Target(), None) + [trial(of, "pbd", verdict="skipped")]
+    rows[-1].runs = {}
+    told = []
+
+    def execute(jobs, store, hooks, workers):
+        assert [(j.method, j.scenario["seed"]) for j in jobs] == [(m, s) for m in ("mpm", "sph") for s in (0, 1)]
+        assert workers == 3
+        for i in (1, 2, 0, 3):
+            hooks.started(i, jobs[i], False)
+            hooks.progress(i, {})
+            hooks.ended(i, whole(tmp_path))
+        return []
+
+    monkeypatch.setattr(module, "execute", execute)
+    module.run(
+        rows, None, 3, lambda i, t, reused: told.append(f"{i} {t.method} starts"), lambda i, _: told.append(f"{i} goes on"),
+        lambda i: told.append(f"{i} stops"), lambda t: told.append(f"{t.method} {t.verdict}"),
+    )  # fmt: skip
+    assert told == [
+        "law pass", "pbd skipped", "1 mpm starts", "1 goes on", "1 stops", "2 sph starts", "2 goes on", "2 stops",
+        "0 mpm starts", "0 goes on", "0 stops", "mpm pass", "3 sph starts", "3 goes on", "3 stops", "sph pass",
+    ]  # fmt: skip
+    assert [t.error for t in rows[:3]] == [0.02, 0.02, 0.03] and rows[2].cost["wall_s"] < 60.0

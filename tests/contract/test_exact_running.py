@@ -1,0 +1,295 @@
+"""The loop by hand, with the smallest method there is: ticks, outputs, bounds, verdicts, limits of time, resumption."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fluidbench import checkpoint, simulation
+from fluidbench.checkpoint import Checkpoints
+from fluidbench.child import perform
+from fluidbench.run import Job
+from fluidbench.simulation import Outcome, Simulation, Verdict
+from fluidbench.store import read_record
+from fluidbench.study.estimate import estimate
+from fluidbench.timestep import Bound
+
+from ..conftest import bead, scenario
+from .ballistic import Ballistic
+
+FALLING = {"duration": 1.0, "tick": 0.125, "output_interval": 0.25, "spacing": 0.02,
+           "domain": {"lower": [0, 0, -9.0], "upper": [1, 1, 1]},
+           "bodies": [{"kind": "box", "center": [0.5, 0.5, 0.9], "size": [0.04] * 3}]}  # fmt: skip
+
+
+class Stepping(Ballistic):
+    """Takes the steps that it is told to, and notes the speeds it was asked for."""
+
+    dt = 0.05
+
+    @classmethod
+    def bounds(cls, s, config, speed):
+        return [Bound("loose", 9.0, "", ""), Bound("told", cls.dt, f"{speed!r}", "")]
+
+
+def falling(method=Ballistic, **more):
+    return Simulation(scenario(**{**FALLING, **more}), method)
+
+
+def test_outputs_come_at_their_ticks_and_the_first_before_all():
+    sim, seen = falling(Stepping), []
+    outcome = sim.run(lambda s, vital: seen.append((s.now, s.done, vital.speed)))
+    assert [row[:2] for row in seen] == [(0.0, 0), (0.25, 2), (0.5, 4), (0.75, 6), (1.0, 8)]
+    assert [row[2] for row in seen] == pytest.approx([9.81 * t for t in (0, 0.25, 0.5, 0.75, 1.0)], rel=1e-5)
+    assert (outcome.verdict, outcome.reason, outcome.time, outcome.ticks) == (Verdict.COMPLETED, "", 1.0, 8)
+    assert outcome.substeps == 24 and outcome.particle_substeps == 24 * 8 and outcome.peak_particles == 8
+    assert outcome.binding == {"told": 1.0} and outcome.wall > 0 and outcome.cpu >= 0 and outcome.prepare_wall >= 0
+    assert sim.substep_launches.count == 1 and (sim.tick, sim.ticks, sim.ticks_per_output) == (0.125, 8, 2)
+
+
+def test_the_last_tick_is_an_output_even_between_two():
+    sim, seen = falling(duration=0.85, output_interval=0.375), []
+    sim.run(lambda s, _: seen.append(s.done))
+    assert (sim.ticks, sim.ticks_per_output, seen) == (7, 3, [0, 3, 6, 7])
+
+
+def test_bounds_allow_a_quarter_more_speed_than_was_last_seen():
+    sim = falling(Stepping)
+    own = sim.scenario.reference_speed
+    assert [b.formula for b in sim.bounds()] == ["", repr(1.25 * own)]
+    sim.pool.velocity.fill_((3.0, 4.0, 0.0))
+    assert sim.look().speed == pytest.approx(5.0) and sim.speed == pytest.approx(5.0)
+    assert sim.bounds()[1].formula == repr(1.25 * sim.speed)
+    sim.pool.velocity.fill_((0.0, 0.0, 0.0))
+    sim.look()
+    assert sim.speed == pytest.approx(0.1 * own)  # what rests may start again
+
+
+def test_bounds_are_of_the_material_that_will_be_there_after_the_tick():
+    cure = {"kind": "jump", "delay": 0.2, "youngs_modulus": 4e4}
+    s = scenario(material={"density": 1000.0, "youngs_modulus": 1e4, "cure": cure}, duration=0.64, tick=0.01,
+                 output_interval=0.01, gravity=[0, 0, 0])  # fmt: skip
+    sim = Simulation(s, "mpm")
+    early = min(b.dt for b in sim.bounds())
+    sim.done = 18  # ends at 0.19; materials are known at multiples of 10 ms, and that of 0.2 from there on
+    assert min(b.dt for b in sim.bounds()) == early
+    sim.done = 19
+    late = min(b.dt for b in sim.bounds())
+    c, v = s.wave_speed, 1.25 * s.reference_speed
+    assert late == pytest.approx(early * (c + v) / (2 * c + v)) and len(sim.bounds()) == 4
+
+
+def test_a_tick_is_cut_into_equal_substeps_of_the_bound():
+    """Three of a 24th of a second: v = -g t, z falls by g dt^2 (1 + 2 + 3)."""
+    sim = falling(Stepping)
+    before = sim.frame()["position"]
+    steps = sim.advance()
+    assert (steps.substeps, steps.dt, steps.binding.name, sim.done, sim.now) == (3, 0.125 / 3, "told", 1, 0.125)
+    after = sim.frame()
+    assert after["velocity"][:, 2] == pytest.approx(np.full(8, -9.81 * 0.125), rel=1e-6)
+    assert before[:, 2] - after["position"][:, 2] == pytest.approx(np.full(8, 9.81 * 6 * (0.125 / 3) ** 2), rel=1e-4)
+    sim.march(0.01, 2)
+    assert sim.frame()["velocity"][:, 2] == pytest.approx(np.full(8, -9.81 * 0.145), rel=1e-6) and sim.done == 1
+
+
+def test_every_32nd_tick_sorts_the_pool():
+    sorted_at = []
+
+    class Sorting(Stepping):
+        dt = 9.0
+
+        def sort_keys(self):
+            sorted_at.append(sim.done)
+
+    sim = falling(Sorting, duration=8.125)
+    assert sim.ticks == 65
+    sim.run()
+    assert sorted_at == [0, 32, 64] and simulation.SORT_TICKS == 32
+
+
+def test_the_order_of_a_sort_is_that_of_the_keys():
+    import warp as wp
+
+    sim = falling()
+    keys = np.zeros(2 * sim.pool.size, np.int64)
+    keys[: sim.pool.size] = np.arange(sim.pool.size)
+    keys[:3] = [2, 1, 0]
+    sim.reorder(wp.array(keys, dtype=wp.int64))
+    assert sim.pool.origin.numpy()[:5].tolist() == [2, 1, 0, 3, 4]
+    sim.reorder(wp.array(keys, dtype=wp.int64))
+    assert sim.pool.origin.numpy()[:5].tolist() == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("wall", "done", "limit", "late"),
+    [
+        (10.1, 99, 10.0, True),  # over the limit
+        (9.9, 99, 10.0, False),
+        (8.1, 40, 10.0, True),  # after 8 s: 20.25 s expected, more than twice
+        (8.1, 41, 10.0, False),  # 19.8 s
+        (7.9, 1, 10.0, False),  # too early to tell
+        (3.1, 1, 3.0, True),
+        (0.5, 1, 0.4, True),
+        (0.3, 1, 0.4, False),
+    ],
+)
+def test_a_run_is_stopped_when_it_cannot_make_it(wall, done, limit, late):
+    sim = SimpleNamespace(ticks=100, done=done, now=0.5)
+    words = Simulation._too_slow(sim, Outcome(Verdict.COMPLETED, wall=wall), limit)
+    assert (words is not None) is late
+    if late:
+        assert words == (
+            f"stopped at t = 0.5 s after {wall:.0f} s: at this pace the run takes at least {wall * 100 / done:.0f} s, "
+            f"the limit is {limit:.0f} s"
+        )
+
+
+def test_a_run_without_time_times_out_and_shows_no_more():
+    seen = []
+    outcome = falling().run(lambda s, _: seen.append(s.done), wall_limit=0.0)
+    assert outcome.verdict is Verdict.TIMEOUT and outcome.ticks == 1 and seen == [0]
+    assert outcome.reason.startswith("stopped at t = 0.125 s after 0 s")
+
+
+def test_what_breaks_ends_the_run_with_its_time_and_its_reason():
+    class Full(Stepping):
+        faults = {1: "too full", 4: "too long", 2: "not this"}
+
+    outcome = falling(Full).run()
+    assert outcome.verdict is Verdict.COMPLETED
+    sim = falling(Full)
+    sim.pool.fault.fill_(5)
+    outcome = sim.run()
+    assert (outcome.verdict, outcome.reason) == (Verdict.OUT_OF_CAPACITY, "at t = 0.125 s too full; too long")
+    sim = falling(Full)
+    sim.pool.fault.fill_(1 | 2048)  # a blow-up goes before what it filled
+    assert sim.run().verdict is Verdict.DIVERGED
+    late = falling(Full)
+    late.film = SimpleNamespace(due=lambda now: now > 0.9, shoot=lambda s: s.pool.fault.fill_(1024))
+    outcome = late.run()  # broken after the last look, and found all the same
+    assert outcome.verdict is Verdict.DIVERGED and outcome.reason.startswith("at t = 1 s a particle was thrown")
+    small = falling()
+    small.emission = SimpleNamespace(advance=lambda now, tick: small.pool.need(0, 99))
+    outcome = small.run()
+    assert outcome.verdict is Verdict.OUT_OF_CAPACITY and "and 107 are needed" in outcome.reason
+
+
+# --- going on from a checkpoint
+
+
+def kept(tmp_path, sim, every=5.0, **identity):
+    return Checkpoints(tmp_path, every, {"key": "k", **identity}, sim, [])
+
+
+def test_a_checkpoint_is_due_after_its_interval(tmp_path, monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr(checkpoint.time, "monotonic", lambda: clock[0])
+    points = kept(tmp_path, falling())
+    assert [points.due() for clock[0] in (104.9, 105.0, 200.0)] == [False, True, True]
+    points.write(Outcome(Verdict.COMPLETED))
+    assert [points.due() for clock[0] in (204.9, 205.0)] == [False, True]
+    assert not kept(tmp_path, falling(), every=0.0).due()
+
+
+def test_a_run_goes_on_as_if_nothing_had_happened(tmp_path):
+    whole = falling(Stepping)
+    expected = whole.run()
+    first = falling(Stepping)
+    points = kept(tmp_path, first, every=1e-9)
+    outcome = Outcome(Verdict.COMPLETED)
+    for _ in range(3):
+        first._tick(outcome, 1, None, None)
+    points.rows.append({"time_s": 0.25})
+    points.write(outcome)
+    second = falling(Stepping)
+    again = kept(tmp_path, second)
+    done = second.run(lambda s, _: again.rows.append({"time_s": s.now}), checkpoints=again)
+    assert (done.verdict, done.time, done.substeps, done.binding) == (
+        "completed",
+        1.0,
+        expected.substeps,
+        {"told": 1.0},
+    )
+    assert [row["time_s"] for row in again.rows] == [0.25, 0.5, 0.75, 1.0] and again.resumed == 1
+    for name, value in whole.frame().items():
+        assert np.array_equal(second.frame()[name], value), name
+    assert done.wall > outcome.wall > 0
+    third = kept(tmp_path, falling(Stepping))
+    third.resumed = 5
+    assert third.restore(Outcome(Verdict.COMPLETED)) and third.resumed == 1
+    third.discard()
+    assert not third.path.exists() and not third.restore(Outcome(Verdict.COMPLETED))
+    third.discard()
+
+
+@pytest.mark.parametrize("change", [{"key": "other"}, {"code": "x"}])
+def test_a_checkpoint_is_of_this_very_run(tmp_path, change):
+    kept(tmp_path, falling()).write(Outcome(Verdict.COMPLETED))
+    other = Checkpoints(tmp_path, 5.0, {"key": "k"} | change, falling(), [])
+    assert not other.restore(Outcome(Verdict.COMPLETED)) and other.resumed == 0 and other.simulation.done == 0
+
+
+def test_a_torn_checkpoint_is_no_checkpoint(tmp_path):
+    points = kept(tmp_path, falling())
+    points.write(Outcome(Verdict.COMPLETED))
+    whole = points.path.read_bytes()
+    for torn in (whole[: len(whole) // 2], b"", b"junk"):
+        points.path.write_bytes(torn)
+        assert not points.restore(Outcome(Verdict.COMPLETED))
+    points.path.write_bytes(whole)
+    assert points.restore(Outcome(Verdict.COMPLETED))
+
+
+def test_the_film_goes_on_with_its_next_picture(tmp_path):
+    sim = falling()
+    sim.film = SimpleNamespace(shots=3, next=0.7)
+    kept(tmp_path, sim).write(Outcome(Verdict.COMPLETED))
+    other = falling()
+    other.film = SimpleNamespace(shots=0, next=0.0)
+    assert kept(tmp_path, other).restore(Outcome(Verdict.COMPLETED))
+    assert (other.film.shots, other.film.next) == (3, 0.7)
+
+
+# --- a run's own process
+
+
+def test_a_run_leaves_its_record_series_and_frames(tmp_path):
+    s = scenario(duration=0.05, tick=0.01, output_interval=0.025, spacing=0.02)
+    told = []
+    perform(Job(s.model_dump(mode="json"), "mpm", keep_frames=True, repeat=3), tmp_path, told.append)
+    record, why = read_record(tmp_path)
+    assert why == "" and (record["verdict"], record["repeat"], record["resumed"]) == ("completed", 3, 0)
+    assert set(record["files"]) == {"series.parquet", "final.npz", *(f"frame_000{i}.npz" for i in range(3))}
+    assert [t["time"] for t in told] == pytest.approx([0.0, 0.025, 0.05]) and {t["until"] for t in told} == {0.05}
+    mass = record["measures"]["mass_kg"]
+    assert mass == pytest.approx(1000.0 * 0.08**3, rel=1e-5) and record["print"] == "" and record["success"] == []
+    with np.load(tmp_path / "frame_0001.npz") as frame, np.load(tmp_path / "final.npz") as last:
+        assert float(frame["time"]) == pytest.approx(0.025) and float(last["time"]) == pytest.approx(0.05)
+    import pandas as pd
+
+    series = pd.read_parquet(tmp_path / "series.parquet")
+    assert series["time_s"].tolist() == pytest.approx([0.0, 0.025, 0.05]) and series["mass_kg"].iloc[
+        1
+    ] == pytest.approx(mass)
+    assert set(record["bounds_s"]) == {"acoustic", "advective"} and record["launches"]["process_per_tick"] == 0
+    assert sum(record["binding_s"].values()) == pytest.approx(0.05) and record["input"] == s.model_dump(mode="json")
+
+
+def test_an_estimate_by_hand():
+    """A bead that takes 0.3 of 0.6 s to lay: on average three quarters of the particles are there."""
+    s = bead(duration=0.6)
+
+    class Estimated(Stepping):
+        dt, typical_rate, typical_bytes = 1e-3, 1e4, 200.0
+
+    tick, ticks, _ = s.schedule
+    found = estimate(s, Estimated)
+    substeps = math.ceil(tick / 1e-3 - 1e-9) * ticks
+    assert (found.method, found.refusal, found.substeps) == ("ballistic", None, substeps)
+    assert found.memory_bytes == 200.0 * found.particles and found.bounds[1].formula == repr(s.reference_speed)
+    assert found.wall_s == pytest.approx(substeps * found.particles * 0.75 / 1e4)
+    short = estimate(bead(duration=0.2), Estimated)
+    assert short.wall_s == pytest.approx(short.substeps * short.particles * 0.5 / 1e4)
+    still = estimate(scenario(), Estimated)
+    assert still.wall_s == pytest.approx(still.substeps * still.particles / 1e4)

@@ -1,0 +1,186 @@
+"""Cells of the tables as they are formatted, and of the page of the printed tower."""
+
+import math
+
+import pytest
+
+from fluidbench.report import stability as stability_page
+from fluidbench.report import table1 as table1_page
+from fluidbench.report import table2 as table2_page
+from fluidbench.report.tables import against_reference, backends, costs, fidelity, label, number, spread, successes
+from fluidbench.study.table2 import Row
+
+from .made import case, evidence, finished, known, repeated, trial
+
+
+def test_numbers_have_four_digits_and_spreads_one():
+    assert (number(1234.56), number(0.000123456), number(2.0)) == ("1235", "0.0001235", "2")
+    assert spread([1.23456]) == "1.235" and spread([8.0, 12.0]) == "10 ± 3" and spread([1.0, 1.0]) == "1 ± 0"
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("bead_width_m", "bead width [m]"), ("bead_area_m2", "bead area [m²]"), ("mass_kg", "mass [kg]"),
+        ("kinetic_energy_J", "kinetic energy [J]"), ("wall_s", "wall [s]"), ("peak_memory_MiB", "peak memory [MiB]"),
+        ("steps_per_s", "steps per s"), ("particle_substeps_per_cpu_s", "particle substeps per cpu s"),
+        ("wall_per_simulated_s", "wall per simulated s"), ("slump", "slump"), ("m", "m"), ("print_standing", "print standing"),
+    ],
+)  # fmt: skip
+def test_keys_in_words(key, words):
+    assert label(key) == words
+
+
+def test_fidelity_has_a_column_a_method_and_hides_the_ledger():
+    runs = [
+        finished("mpm", measures={"bead_width_m": w, "momentum_x_kg_m_s": 1.0, "particles": 3, "center_x_m": 0.0})
+        for w in (0.010, 0.012)
+    ] + [finished("sph", "diverged"), finished("sph", measures={"slump": 0.5}, repeat=1, print="broken")]
+    table = fidelity(runs)
+    assert table.head == ["", "mpm", "sph"] and table.rows == [
+        ["verdict", "completed", "completed, diverged"], ["print", "-", "broken"],
+        ["bead width [m]", "0.011 ± 0.001", "-"], ["slump", "-", "0.5"],
+    ]  # fmt: skip
+    assert [row[0] for row in fidelity(runs[:2]).rows] == ["verdict", "bead width [m]"]
+    odd = fidelity([finished(measures={"potential_energy_J": 1.0, "angular_momentum_x_kg_m2_s": 1.0, "top_m": 1.0})])
+    assert [row[0] for row in odd.rows] == ["verdict", "top [m]"]
+
+
+def answer(**more):
+    return {
+        "quantity": "q",
+        "measured": 1.2345678,
+        "reference": 2.0,
+        "error": 0.125,
+        "measure": "relative",
+        "source": "s",
+    } | more
+
+
+def test_errors_are_percents_but_where_they_are_absolute():
+    runs = [finished(answers=[answer(), answer(measure="absolute, of T"), answer(measure="in discs"), answer(measure="RMS")],
+                     not_compared=["why"]), finished(answers=[answer()], repeat=1, not_compared=["why", "also"])]  # fmt: skip
+    table = against_reference(runs)
+    assert [row[4] for row in table.rows] == ["12.50 %", "0.1250", "0.1250", "12.50 %"]
+    assert table.rows[0] == ["q", "mpm", "1.235", "2", "12.50 %", "relative", "s"]
+    assert table.note == "not compared: why\nnot compared: also"
+    assert against_reference([finished()]) is None and against_reference([finished(not_compared=["x"])]).rows == []
+
+
+def test_criteria_have_a_row_each():
+    def criteria(*rows):
+        return [{"name": n, "measured": m, "wanted": ">= 1", "met": met} for n, m, met in rows]
+
+    runs = [finished("mpm", success=criteria(("height", 0.51234, False), ("laid", 3, True))), finished("sph"),
+            finished("pbd", success=criteria(("height", 1.0, True), ("laid", 2, False))),
+            finished("pbd", success=criteria(("height", 9.0, True), ("laid", 9, False)), repeat=1)]  # fmt: skip
+    table = successes(runs)
+    assert table.head == ["", "wanted", "mpm", "pbd"]
+    assert table.rows == [["height", ">= 1", "0.5123 NO", "1 yes"], ["laid", ">= 1", "3 yes", "2 NO"]]
+    assert successes([finished()]) is None
+
+
+COSTLY = {"substeps": 5, "particle_substeps_per_s": 1e4, "particle_substeps_per_cpu_s": 2e4, "peak_particles": 7,
+          "peak_memory_MiB": 3.0, "prepare_s": 0.5}  # fmt: skip
+
+
+def costly(method="mpm", verdict="completed", **more):
+    run = finished(method, verdict, **more)
+    if verdict == "completed":
+        run.record["cost"] |= COSTLY | {k: v for k, v in more.items() if k in COSTLY}
+    return run
+
+
+def test_costs_have_a_row_each():
+    runs = [costly(wall_s=1.0, binding_s={"a": 1.0, "b": 2.0}), costly(wall_s=3.0), costly("sph", "error")]
+    rows = {row[0]: row[1:] for row in costs(runs).rows}
+    assert (
+        rows["wall [s]"] == ["2 ± 1", "-"]
+        and rows["binding bound"] == ["b", "-"]
+        and rows["substeps"] == ["5 ± 0", "-"]
+    )
+    assert len(rows) == 14 and rows["mean dt [s]"] == ["0.0001 ± 0", "-"]
+
+
+def test_backends_are_compared_where_there_are_two():
+    def pair(second=None, **more):
+        measures = {"bead_width_m": 0.010, "layer_1_height_m": 0.005, "slump": 0.1, "resolution_m": 1e-3}
+        first = [costly(measures=measures, particle_substeps_per_s=1e4 * k) for k in (1, 3)]
+        other = costly(measures=measures | {"bead_width_m": 0.0105, "layer_1_height_m": 0.0048, "slump": 0.9},
+                       backend="taichi", particle_substeps_per_s=5e4, **more)  # fmt: skip
+        return [*first, other]
+
+    table = backends(pair(wall_s=4.0))
+    assert table.head == ["", "warp", "taichi", "second / first"]
+    assert table.rows == [
+        ["mpm: particle substeps per s", "2e+04 ± 1e+04", "5e+04", "2.5"],
+        ["mpm: particle substeps per cpu s", "2e+04 ± 0", "2e+04", "1"], ["mpm: wall [s]", "1 ± 0", "4", "4"],
+        ["mpm: prepare [s]", "0.5 ± 0", "0.5", "1"],
+        ["mpm: bead width [m], apart most", "0.01", "0.0105", "0.5 of the resolution"],
+    ]  # fmt: skip
+    assert backends(pair()[:2]) is None and backends([*pair()[:2], finished(verdict="error", backend="taichi")]) is None
+
+
+# --- pages of studies
+
+
+def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
+    def runs(speeds, **more):
+        made = [finished(steps_per_s=s, simulated_to_real=s / 1000, mean_dt_s=2e-4, key="k", folder=tmp_path / "r", **more)
+                for s in speeds]  # fmt: skip
+        for run in made:
+            run.record["cost"] |= {"peak_particles": 1234}
+            run.record.update(launches={"per_substep": 4}, bytes={"a": 10, "b": 32})
+        return made
+
+    broken = [
+        finished(verdict="error", key="k", folder=tmp_path / "r"),
+        finished(verdict="timeout", key="k", folder=tmp_path / "r"),
+    ]
+    rows = [Row("plain", None, "mpm", runs([90.0, 110.0], machine={"cores": "2"}), runs([40.0, 40.0])),
+            Row("expansion + curing + drone", 5000, "mpm", broken, [])]  # fmt: skip
+    made = table2_page.report(rows, tmp_path)
+    assert made.tables[0].rows == [
+        ["plain", "mpm", "as needed", "1234", "0.2", "100 ± 14", "0.1 ± 0.014", "40 ± 0", "0.04 ± 0", "-"],
+        ["expansion + curing + drone", "mpm", "5000", "-", "-", "error, timeout", "-", "-", "-", "60.0"],
+    ]  # fmt: skip
+    first, second = made.data.to_dict("records")
+    assert (first["steps_per_s"], first["steps_per_s_pictures"], first["simulated_to_real"]) == (100.0, 40.0, 0.1)
+    assert (first["repeats"], first["bytes"], first["launches_per_substep"], second["repeats"]) == (2, 42, 4, 0)
+    assert made.machine == "cores 2" and [len(v) for v in made.runs.values()] == [4, 2]
+    assert made.findings[0].startswith("mpm: 'cost insensitive to the pool's size': not decidable")
+
+
+def test_the_page_of_the_table_counts_its_verdicts(tmp_path):
+    rows = known("mpm", 4, 0, "elastic") + [trial(case("g0", "elastic"), "mpm", spacing=0.02, wall=2.0)]
+    e = evidence(rows, repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0))
+    for run in e.runs():
+        run.record["key"] = "k"
+        object.__setattr__(run, "folder", tmp_path / "runs" / "x")
+    made = table1_page.report(e, tmp_path)
+    cells = [row for row in made.tables[0].rows if not row[0].startswith("in both")]
+    counts = dict(
+        part.split(" ", 1)[::-1] for part in made.findings[0].removeprefix("Verdicts: ").rstrip(".").split(", ")
+    )
+    for verdict in ("confirmed", "refuted", "not decidable"):
+        assert int(counts[verdict]) == sum(row[-1] == verdict for row in cells)
+    assert len(made.findings) == 1 + sum(row[-1] != "not decidable" for row in made.tables[0].rows)
+    assert len(made.data) == len(made.tables[0].rows) and len(made.plots) == 1
+    assert made.tables[1].rows[0][0] == "fidelity"
+
+
+def test_the_page_of_stability_draws_limits_and_marks_what_has_none():
+    point = {"axis": "density", "method": "mpm", "verdict": "held", "reason": "", "dt_own_s": 1.0, "binding": "b",
+             "dt_lump_s": 2.0, "lump_limit_found": True, "dt_theory_s": 3.0, "dt_block_s": math.inf}  # fmt: skip
+    points = [point | {"value": 10.0}, point | {"value": 0.0, "lump_limit_found": False},
+              {"axis": "density", "method": "sph", "value": 5.0, "verdict": "refused", "reason": "no"}]  # fmt: skip
+    assert stability_page._points(points).rows == [
+        ["density", "10", "mpm", "held", "1", "b", "2", "-", "3"], ["density", "0", "mpm", "held", "1", "b", "> 2", "-", "3"],
+        ["density", "5", "sph", "refused", "-", "-", "-", "-", "-"],
+    ]  # fmt: skip
+    (plot,) = stability_page._maps(points)
+    assert [(t.label, list(t.x), list(t.y)) for t in plot.traces] == [
+        ("mpm", [10.0], [2.0]), ("mpm, theory", [10.0], [3.0]), ("mpm, own bound", [10.0], [1.0]),
+    ]  # fmt: skip
+    block = {"kind": "acoustic", "method": "mpm", "dt_limit_s": 3.0, "dt_theory_s": 4.0, "dt_own_s": 1.5}
+    assert stability_page._blocks([block]).rows == [["acoustic", "mpm", "3", "4", "0.75", "0.5"]]
