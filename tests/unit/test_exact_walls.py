@@ -1,0 +1,314 @@
+"""Walls, images, contact and stress as the kernels see them, by hand: device functions called one by one."""
+
+import math
+
+import numpy as np
+import pytest
+import warp as wp
+
+from fluidbench.scene import FRICTION, PERIODIC, SLIP, STICK, Box, Scene
+from solvers import corrected, neighbours
+from solvers.corrected import least_eigenvalue, mirrored_stress, symmetric_inverse
+from solvers.mpm import grid as mpm_grid
+from solvers.mpm import kernels_warp as mpm
+from solvers.mpm import walls as mpm_walls
+from solvers.neighbours import (
+    contained,
+    face_kind,
+    has_choice,
+    image_code,
+    image_gradient,
+    image_position,
+    image_rate,
+    image_velocity,
+    near_faces,
+    opposite,
+)
+from solvers.pbd import bonds, walls
+from solvers.pbd.bonds import mirrors_only, nearest_image
+
+from ..conftest import scenario
+
+wp.set_module_options({"enable_backward": False})
+
+LOW, HIGH = np.array([0.0, -1.0, 2.0]), np.array([1.0, 2.0, 7.0])
+V = (1.0, 2.0, 4.0)
+
+
+def box(*kinds):
+    """A box of 1 x 3 x 5 whose axes have these kinds of walls."""
+    made = Box()
+    made.lower, made.upper = wp.vec3(*LOW), wp.vec3(*HIGH)
+    made.lower_kind = made.upper_kind = wp.vec3i(*[int(k) for k in kinds])
+    return made
+
+
+def code_of(*choices):
+    return sum(c * 3**axis for axis, c in enumerate(choices))
+
+
+@wp.kernel
+def look(
+    b: Box, x: wp.vec3, v: wp.vec3, g: wp.mat33, near: wp.vec3i, code: wp.array(dtype=int),
+    # outputs
+    vectors: wp.array2d(dtype=wp.vec3), matrices: wp.array2d(dtype=wp.mat33), numbers: wp.array2d(dtype=int),
+):  # fmt: skip
+    """Everything that image codes mean, as integers of the device understand them."""
+    i = wp.tid()
+    c = code[i]
+    vectors[i, 0] = image_position(b, x, c)
+    vectors[i, 1] = image_velocity(b, v, c)
+    vectors[i, 2] = image_gradient(b, v, c)
+    matrices[i, 0] = image_rate(b, g, c)
+    matrices[i, 1] = mirrored_stress(b, g, c)
+    for axis in range(3):
+        numbers[i, axis] = image_code(c, axis)
+        numbers[i, 3 + axis] = face_kind(b, c, axis)
+    numbers[i, 6] = opposite(c)
+    numbers[i, 7] = mirrors_only(b, c)
+    numbers[i, 8] = int(has_choice(near, c))
+
+
+@wp.kernel
+def invert(b: Box, m: wp.array(dtype=wp.mat33), r: wp.array(dtype=wp.vec3), inverse: wp.array(dtype=wp.mat33),
+           least: wp.array(dtype=float), way: wp.array(dtype=wp.vec3)):  # fmt: skip
+    i = wp.tid()
+    inverse[i] = symmetric_inverse(m[i])
+    least[i] = least_eigenvalue(m[i])
+    way[i] = nearest_image(b, r[i])
+
+
+X, GRADIENT = np.array([0.25, 0.5, 3.0]), np.arange(1.0, 10.0).reshape(3, 3)
+
+
+def seen(b, *codes, near=(7, 7, 7)):
+    """(vectors, matrices, numbers) of each code, see `look`."""
+    n = len(codes)
+    out = [wp.zeros((n, 3), dtype=wp.vec3), wp.zeros((n, 2), dtype=wp.mat33), wp.zeros((n, 9), dtype=int)]
+    wp.launch(look, n, [b, wp.vec3(*X), wp.vec3(*V), wp.mat33(*GRADIENT.ravel()), wp.vec3i(*near),
+                        wp.array(codes, dtype=int)], out)  # fmt: skip
+    return [array.numpy() for array in out]
+
+
+def inverted(*matrices, r=(0.0, 0.0, 0.0), b=None):
+    """(inverse, least eigenvalue, shortest way) of each matrix."""
+    n = len(matrices)
+    out = [wp.zeros(n, dtype=wp.mat33), wp.zeros(n, dtype=float), wp.zeros(n, dtype=wp.vec3)]
+    given = wp.array(np.array(matrices, np.float32).reshape(n, 3, 3), dtype=wp.mat33)
+    wp.launch(invert, n, [b or box(SLIP, SLIP, SLIP), given, wp.array([r] * n, dtype=wp.vec3)], out)
+    return [array.numpy() for array in out]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("kind", [SLIP, STICK, FRICTION, PERIODIC])
+def test_images_in_each_face(axis, kind):
+    """dv_i / dx_j changes with the sign of v_i and of x_j; a stress with those of what slips."""
+    b = box(*[kind if a == axis else SLIP for a in range(3)])
+    for choice, mirror, shift in ((1, 2 * LOW - X, LOW - HIGH), (2, 2 * HIGH - X, HIGH - LOW)):
+        choices = [choice if a == axis else 0 for a in range(3)]
+        (x, v, g), (rate, stress), numbers = (rows[0] for rows in seen(b, code_of(*choices)))
+        expected = X.copy()
+        expected[axis] = X[axis] + shift[axis] if kind == PERIODIC else mirror[axis]
+        assert x == pytest.approx(expected)
+        assert list(numbers[:3]) == choices
+        assert list(numbers[3:6]) == [kind if a == axis else PERIODIC for a in range(3)]
+        assert numbers[6] == code_of(*[(3 - c) % 3 for c in choices])
+        assert numbers[7] == {SLIP: code_of(*choices), PERIODIC: 0}.get(kind, -1)
+        one = np.array([-1.0 if a == axis else 1.0 for a in range(3)])
+        turned = {SLIP: one, FRICTION: one, STICK: -np.ones(3), PERIODIC: np.ones(3)}[kind]
+        normal = np.ones(3) if kind == PERIODIC else one
+        assert v.tolist() == (turned * V).tolist() and g.tolist() == (normal * V).tolist()
+        assert rate == pytest.approx(np.outer(turned, normal) * GRADIENT)
+        signs = one if kind in (SLIP, FRICTION) else np.ones(3)
+        assert stress == pytest.approx(np.outer(signs, signs) * GRADIENT)
+
+
+def test_images_in_corners_combine():
+    (x, v, g), (rate, stress), numbers = (rows[0] for rows in seen(box(SLIP, STICK, PERIODIC), code_of(1, 2, 1)))
+    assert (
+        x == pytest.approx([-0.25, 3.5, -2.0]) and v.tolist() == [1.0, -2.0, -4.0] and g.tolist() == [-1.0, -2.0, 4.0]
+    )
+    assert list(numbers) == [1, 2, 1, SLIP, STICK, PERIODIC, code_of(2, 1, 2), -1, 1]
+    assert rate == pytest.approx(np.outer([1, -1, -1], [-1, -1, 1]) * GRADIENT)
+    assert stress == pytest.approx(np.outer([-1, 1, 1], [-1, 1, 1]) * GRADIENT)
+    _, _, numbers = (rows[0] for rows in seen(box(SLIP, PERIODIC, SLIP), code_of(1, 2, 2)))
+    assert numbers[7] == code_of(1, 0, 2)
+
+
+def test_the_upper_wall_has_its_own_kind():
+    b = box(SLIP, SLIP, SLIP)
+    b.upper_kind = wp.vec3i(STICK, FRICTION, SLIP)
+    numbers = seen(b, code_of(2, 2, 2), code_of(1, 1, 1))[2]
+    assert numbers[:, 3:6].tolist() == [[STICK, FRICTION, SLIP], [SLIP] * 3]
+
+
+def test_codes_use_faces_that_are_near():
+    allowed = seen(box(SLIP, SLIP, SLIP), *range(27), near=(5, 4, 7))[2][:, 8]
+    assert set(np.flatnonzero(allowed)) == {code_of(a, 0, c) for a in (0, 1) for c in (0, 1, 2)}
+    allowed = seen(box(SLIP, SLIP, SLIP), *range(27), near=(4, 6, 4))[2][:, 8]
+    assert set(np.flatnonzero(allowed)) == {code_of(0, b, 0) for b in (0, 2)}
+
+
+def test_particles_stay_in_front_of_walls_and_wrap():
+    b = box(SLIP, PERIODIC, STICK)
+    for x, inside in (((-1.0, 0.0, 1.0), (0.1, 0.0, 2.1)), ((5.0, 2.0, 9.0), (0.9, -1.0, 6.9)), ((0.5, -1.01, 3.0), (0.5, 1.99, 3.0)),
+                      ((0.05, -1.0, 6.95), (0.1, -1.0, 6.9)), ((0.5, 2.5, 3.0), (0.5, -0.5, 3.0))):  # fmt: skip
+        assert list(contained(b, wp.vec3(*x), 0.1)) == pytest.approx(inside)
+    assert list(walls.pushed(b, wp.vec3(-1.0, 2.5, 3.0), wp.vec3(0.1, -0.5, 3.0))) == pytest.approx([1.1, 0.0, 0.0])
+
+
+def test_faces_that_are_near_and_codes_that_use_them():
+    b = box(SLIP, PERIODIC, SLIP)
+    for x, periodic, bits in (((0.05, -0.9, 4.0), False, (5, 4, 4)), ((0.05, -0.9, 4.0), True, (4, 5, 4)),
+                              ((0.95, 1.9, 6.9), False, (6, 4, 6)), ((0.95, 1.9, 6.9), True, (4, 6, 4)),
+                              ((0.5, 0.0, 4.0), False, (4, 4, 4)), ((0.3, 0.0, 4.0), False, (4, 4, 4))):  # fmt: skip
+        assert tuple(near_faces(b, wp.vec3(*x), 0.2, periodic)) == bits
+    assert tuple(near_faces(b, wp.vec3(0.5, 0.0, 4.0), 0.6, False)) == (7, 4, 4)
+
+
+def test_lists_have_room_for_matter_that_is_1_7_times_as_dense():
+    for ratio in (1.2, 2.0, 3.0):
+        most = 1.7 * 4 / 3 * math.pi * ratio**3
+        assert most <= neighbours.room(ratio) < most + 24 and neighbours.room(ratio) % 16 == 8
+    assert neighbours._grid_shape(1) == (32, 32, 32) and neighbours._grid_shape(64**3) == (64,) * 3
+    assert neighbours._grid_shape(10**9) == (256,) * 3
+
+
+def test_a_moment_is_inverted_where_it_is_sound_and_left_where_it_is_not():
+    """4 det / trace^2 of diag(1, 1, a): up to 0.08 gives the identity, from 0.12 on the inverse."""
+
+    def thin(least):
+        """diag(1, 1, a) with 4 a / (2 + a)^2 = least."""
+        return np.diag([1.0, 1.0, (2 - 2 * least - 2 * math.sqrt(1 - 2 * least)) / least])
+
+    full = np.array([[0.5, 0.1, 0.0], [0.1, 0.75, 0.2], [0.0, 0.2, 1.0]])
+    inverse, least, _ = inverted(full, thin(0.1), thin(0.079), thin(0.121))
+    assert least == pytest.approx([4 * np.linalg.det(full) / 2.25**2, 0.1, 0.079, 0.121], rel=1e-4)
+    assert inverse[0] == pytest.approx(np.linalg.inv(full), rel=1e-5)
+    assert inverse[1] == pytest.approx(0.5 * np.linalg.inv(thin(0.1)) + 0.5 * np.eye(3), rel=1e-3)
+    assert inverse[2] == pytest.approx(np.eye(3)) and inverse[3] == pytest.approx(np.linalg.inv(thin(0.121)), rel=1e-4)
+
+
+def test_stress_of_an_elastic_tensor_by_hand():
+    """G dev b - p, with G = 2, b = (1, 2, 6), its mean 3."""
+    got = np.array(corrected.elastic_stress(2.0, wp.vec3(1.0, 2.0, 6.0), wp.vec3(0.5, 0.25, 0.125), 10.0)).reshape(3, 3)
+    assert got == pytest.approx(np.array([[-14.0, 1.0, 0.5], [1.0, -12.0, 0.25], [0.5, 0.25, -4.0]]))
+
+
+@pytest.mark.parametrize("ratio", [0.99, 1.01])
+def test_kirchhoff_stress_by_hand(ratio):
+    """J p and G dev b, and 2 eta min(J, 1) dev D, of a paste that may carry tension."""
+    material = {"density": 1000.0, "youngs_modulus": 2.6e4, "viscosity": 3.0}
+    phase = Scene(scenario(material=material))._phase(scenario(material=material).material, 0.0)
+    g, k = 1e4, 2.6e4 / 1.2
+    b, s = np.array([1.1, 0.9, 1.3]), (0.05, -0.1, 0.2)
+    c = np.array([[0.5, 1.0, 0.0], [2.0, -0.25, 0.0], [0.0, 4.0, 0.125]])
+    tensor = np.diag(b) + np.array([[0, s[0], s[1]], [s[0], 0, s[2]], [s[1], s[2], 0]])
+    rate = 0.5 * (c + c.T)
+    one = np.eye(3)
+    expected = g * (tensor - b.mean() * one) - ratio * k * (1 / ratio - 1) * one
+    expected += 2 * 3.0 * min(ratio, 1.0) * (rate - np.trace(rate) / 3 * one)
+    got = mpm.kirchhoff(phase, ratio, wp.vec3(*b), wp.vec3(*s), wp.mat33(*c.ravel()))
+    assert np.array(got).reshape(3, 3) == pytest.approx(expected, rel=1e-4)
+
+
+# --- the grid of MPM
+
+
+def test_cells_divide_the_domain_and_walls_lie_on_nodes():
+    walled = {"lower": [0, 0, 0.1], "upper": [0.2, 0.13, 0.2], "walls": {"y_lower": "periodic", "y_upper": "periodic"}}
+    s = scenario(domain=walled, bodies=[{"kind": "box", "center": [0.1, 0.06, 0.15], "size": [0.04] * 3}])
+    cells, dx = mpm_grid.cells_of(s.domain, 0.02)
+    assert cells.tolist() == [10, 6, 5] and dx == pytest.approx([0.02, 0.13 / 6, 0.02])
+    grid = mpm_grid.grid_of(Scene(s), 0.02)
+    assert list(grid.origin) == pytest.approx([-0.08, -4 * 0.13 / 6, 0.02]) and list(grid.wrap) == [0, 6, 0]
+    assert grid.inv_volume == pytest.approx(1 / (0.02 * 0.13 / 6 * 0.02)) and list(grid.first) == [4, 4, 4]
+    assert list(grid.inv_dx) == pytest.approx([50.0, 6 / 0.13, 50.0]) and grid.top_speed == Scene(s).box.top_speed
+    assert list(mpm.first_node(grid, wp.vec3(0.1, 0.0, 0.2))) == [8, 3, 8]  # nodes 8, 9, 10 are 20 mm apart about 0.1 m
+    lone = mpm_grid.grid_of(Scene(s), 0.13 / 5)
+    assert list(lone.first) == [4, 6, 4] and lone.origin[1] == pytest.approx(-6 * 0.13 / 5)
+    assert [mpm_grid.wrapped(n, 6, 5) for n in (4, 5, 6, 10, 11, 12)] == [9, 10, 6, 10, 6, 7]
+    assert [mpm_grid.wrapped(n, 4, 0) for n in (0, 99)] == [0, 99]
+
+
+def mpm_grid_of(**kinds):
+    s = scenario(domain={"lower": [0, 0, 0], "upper": [0.2] * 3, "walls": kinds})
+    return mpm_grid.grid_of(Scene(s), 0.02)  # ten cells: walls at nodes 4 and 14
+
+
+def test_nodes_near_walls_and_their_images():
+    for kinds, images in (((SLIP, STICK), True), ((FRICTION, FRICTION), False), ((PERIODIC, PERIODIC), False)):
+        kinds = [int(k) for k in kinds]
+        mirrored = {n: mpm_walls.mirror(n, 10, *kinds) for n in (2, 3, 4, 5, 13, 14, 15, 16)}
+        assert mirrored == (
+            {2: 6, 3: 5, 4: 4, 5: 5, 13: 13, 14: 14, 15: 13, 16: 12} if images else {n: n for n in mirrored}
+        )
+        behind = {n: mpm_walls.image(n, 10, *kinds) for n in (3, 4, 5, 6, 12, 13, 14)}
+        assert behind == ({3: 3, 4: 4, 5: 3, 6: 6, 12: 12, 13: 15, 14: 14} if images else {n: n for n in behind})
+    assert [mpm_walls.wall_kind(n, int(SLIP), int(STICK), 10) for n in (3, 8, 9, 15)] == [SLIP, SLIP, STICK, STICK]
+    grid = mpm_grid_of(x_lower="periodic", x_upper="periodic")
+    near = {n: bool(mpm_walls.near_wall(grid, wp.vec3i(8, n, 8))) for n in (3, 4, 5, 6, 12, 13, 14, 15)}
+    assert near == {3: True, 4: True, 5: True, 6: False, 12: False, 13: True, 14: True, 15: True}
+    assert not mpm_walls.near_wall(grid, wp.vec3i(4, 8, 8)) and mpm_walls.near_wall(grid, wp.vec3i(8, 8, 13))
+    shares = [mpm_walls.plane_share(grid, wp.vec3i(*n)) for n in ((4, 8, 8), (8, 4, 8), (8, 14, 4), (8, 5, 13))]
+    assert shares == [1.0, 2.0, 4.0, 1.0]
+
+
+def test_velocities_seen_in_walls_and_rubbed_by_them():
+    v = (1.0, 2.0, 4.0, 9.0)
+    assert list(mpm_walls.flipped(wp.vec4(*v), 1, int(SLIP))) == [1.0, -2.0, 4.0, 9.0]
+    assert list(mpm_walls.flipped(wp.vec4(*v), 1, int(STICK))) == [-1.0, -2.0, -4.0, 9.0]
+    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, -2.0), 2, -1.0, 0.5)) == pytest.approx([2.4, 3.2, 0.0])  # 5 - 0.5 x 2
+    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, -2.0), 2, -1.0, 3.0)) == [0.0, 0.0, 0.0]
+    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, 2.0), 2, -1.0, 0.5)) == [3.0, 4.0, 2.0]  # it may lift off
+    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, 2.0), 2, 1.0, 0.5)) == pytest.approx([2.4, 3.2, 0.0])
+    assert list(mpm_walls.unbound(wp.vec4(2.0, 4.0, 6.0, 2.0), wp.vec3(0.0, 0.0, -1.0), 5.0)) == [1.0, 2.0, 2.0, 5.0]
+    assert list(mpm_walls.unbound(wp.vec4(2.0, 4.0, 6.0, 0.0), wp.vec3(0.0, 0.0, -1.0), 5.0)) == [0.0, 0.0, 0.0, 5.0]
+
+
+def test_walls_act_on_nodes_on_and_behind_them_by_their_kind():
+    grid = mpm_grid_of(
+        x_lower="stick", y_lower="slip", y_upper={"friction": 0.25}, z_lower={"friction": 0.5}, z_upper="slip"
+    )
+    rows = {
+        (4, 8, 8): (0.0, 0.0, 0.0), (5, 8, 8): V, (8, 4, 8): (1.0, 0.0, 4.0), (8, 3, 8): (1.0, 0.0, 4.0),
+        (8, 8, 4): V, (8, 8, 14): (1.0, 2.0, 0.0), (14, 8, 8): (0.0, 2.0, 4.0),
+        (8, 14, 8): (1.0 * (1 - 0.5 / math.sqrt(17)), 0.0, 4.0 * (1 - 0.5 / math.sqrt(17))),
+    }  # fmt: skip
+    for node, expected in rows.items():
+        got = mpm_walls.wall_velocity(grid, wp.vec3i(*node), wp.vec3i(1, 1, 1), wp.vec3(*V))
+        assert list(got) == pytest.approx(expected), node
+    down = mpm_walls.wall_velocity(grid, wp.vec3i(8, 8, 4), wp.vec3i(1, 1, 1), wp.vec3(3.0, 4.0, -2.0))
+    assert list(down) == pytest.approx([2.4, 3.2, 0.0])
+    untouched = mpm_walls.wall_velocity(grid, wp.vec3i(4, 4, 4), wp.vec3i(0, 0, 0), wp.vec3(*V))
+    assert list(untouched) == list(V)
+
+
+# --- bonds and rubbing of PBD
+
+
+def test_a_bond_goes_the_short_way_round():
+    b = box(SLIP, PERIODIC, SLIP)
+    for r, short in (((0.9, 2.0, 4.0), (0.9, -1.0, 4.0)), ((0.9, -1.4, 4.0),) * 2, ((0.9, -1.6, 4.0), (0.9, 1.4, 4.0))):
+        assert inverted(np.eye(3), r=r, b=b)[2][0] == pytest.approx(short)
+
+
+def test_the_stiffness_of_a_bond_is_the_mean_of_its_ends():
+    scene = Scene(scenario())
+
+    def phase(youngs):
+        return scene._phase(
+            scenario(material={"density": 1.0, "youngs_modulus": youngs, "poisson_ratio": 0.25}).material, 0.0
+        )
+
+    assert bonds.youngs_between(phase(100.0), phase(300.0)) == pytest.approx(200.0)
+    paste = scenario(material={"density": 1.0, "youngs_modulus": 100.0, "yield_stress": 1.0}).material
+    for cure, holds in ((0.0, False), (0.49, False), (0.5, True), (1.0, True)):
+        assert bool(bonds.bonded(scene._phase(paste, cure))) is holds
+    assert bonds.bonded(phase(1.0)) and not bonds.bonded(scene._phase(scenario().material, 1.0))
+
+
+def test_what_rubs_on_a_face():
+    table = {(FRICTION, 0.9, False): True, (FRICTION, 1.1, False): False, (STICK, 0.9, False): False,
+             (STICK, 0.9, True): True, (SLIP, 0.9, True): False, (STICK, 1.1, True): False}  # fmt: skip
+    assert {key: bool(walls.rubbing(int(key[0]), key[1], 1.0, key[2])) for key in table} == table
