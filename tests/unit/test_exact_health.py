@@ -48,6 +48,8 @@ def test_energies_are_summed_over_particles_and_worlds():
     assert vital.kinetic == pytest.approx(0.5 * 25.0 * (2e-3 + 6e-3), rel=1e-5)
     assert vital.potential == pytest.approx(1e-3 * 10.0 * 0.21 + 3e-3 * 20.0 * 0.21, rel=1e-5)
     assert health.read() == vital  # each reading begins anew
+    still = watched(scenario(gravity=[0, 0, -10.0]))[0].read()
+    assert (still.speed, still.kinetic, still.potential) == (0.0, 0.0, pytest.approx(1e-3 * 10.0 * 0.21, rel=1e-5))
 
 
 @pytest.mark.parametrize(("share", "sound"), [(0.999, True), (1.001, False)])

@@ -1,0 +1,154 @@
+"""Checkpoints of a run, what its own process leaves, and what is estimated before it starts."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fluidbench import checkpoint
+from fluidbench.checkpoint import Checkpoints
+from fluidbench.child import perform
+from fluidbench.run import Job
+from fluidbench.simulation import Outcome, Simulation, Verdict
+from fluidbench.store import read_record
+from fluidbench.study.estimate import estimate
+from fluidbench.timestep import Bound
+
+from ..conftest import bead, scenario
+from .ballistic import Ballistic
+
+FALLING = {"duration": 1.0, "tick": 0.125, "output_interval": 0.25, "spacing": 0.02,
+           "domain": {"lower": [0, 0, -9.0], "upper": [1, 1, 1]},
+           "bodies": [{"kind": "box", "center": [0.5, 0.5, 0.9], "size": [0.04] * 3}]}  # fmt: skip
+
+
+class Stepping(Ballistic):
+    """Takes the steps that it is told to, and notes the speeds it was asked for."""
+
+    dt = 0.05
+
+    @classmethod
+    def bounds(cls, s, config, speed):
+        return [Bound("loose", 9.0, "", ""), Bound("told", cls.dt, f"{speed!r}", "")]
+
+
+def falling(method=Ballistic, **more):
+    return Simulation(scenario(**{**FALLING, **more}), method)
+
+
+def kept(tmp_path, sim, every=5.0, **identity):
+    return Checkpoints(tmp_path, every, {"key": "k", **identity}, sim, [])
+
+
+def test_a_checkpoint_is_due_after_its_interval(tmp_path, monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr(checkpoint.time, "monotonic", lambda: clock[0])
+    points = kept(tmp_path, falling())
+    assert [points.due() for clock[0] in (104.9, 105.0, 200.0)] == [False, True, True]
+    points.write(Outcome(Verdict.COMPLETED))
+    assert [points.due() for clock[0] in (204.9, 205.0)] == [False, True]
+    assert not kept(tmp_path, falling(), every=0.0).due()
+
+
+def test_a_run_goes_on_as_if_nothing_had_happened(tmp_path):
+    whole = falling(Stepping)
+    expected = whole.run()
+    first = falling(Stepping)
+    points = kept(tmp_path, first, every=1e-9)
+    outcome = Outcome(Verdict.COMPLETED)
+    for _ in range(3):
+        first._tick(outcome, 1, None, None)
+    points.rows.append({"time_s": 0.25})
+    points.write(outcome)
+    second = falling(Stepping)
+    again = kept(tmp_path, second)
+    done = second.run(lambda s, _: again.rows.append({"time_s": s.now}), checkpoints=again)
+    assert (done.verdict, done.time, done.substeps, done.binding) == (
+        "completed",
+        1.0,
+        expected.substeps,
+        {"told": 1.0},
+    )
+    assert [row["time_s"] for row in again.rows] == [0.25, 0.5, 0.75, 1.0] and again.resumed == 1
+    for name, value in whole.frame().items():
+        assert np.array_equal(second.frame()[name], value), name
+    assert done.wall > outcome.wall > 0
+    third = kept(tmp_path, falling(Stepping))
+    third.resumed = 5
+    assert third.restore(Outcome(Verdict.COMPLETED)) and third.resumed == 1
+    third.discard()
+    assert not third.path.exists() and not third.restore(Outcome(Verdict.COMPLETED))
+    third.discard()
+
+
+@pytest.mark.parametrize("change", [{"key": "other"}, {"code": "x"}])
+def test_a_checkpoint_is_of_this_very_run(tmp_path, change):
+    kept(tmp_path, falling()).write(Outcome(Verdict.COMPLETED))
+    other = Checkpoints(tmp_path, 5.0, {"key": "k"} | change, falling(), [])
+    assert not other.restore(Outcome(Verdict.COMPLETED)) and other.resumed == 0 and other.simulation.done == 0
+
+
+def test_a_torn_checkpoint_is_no_checkpoint(tmp_path):
+    points = kept(tmp_path, falling())
+    points.write(Outcome(Verdict.COMPLETED))
+    whole = points.path.read_bytes()
+    for torn in (whole[: len(whole) // 2], b"", b"junk"):
+        points.path.write_bytes(torn)
+        assert not points.restore(Outcome(Verdict.COMPLETED))
+    points.path.write_bytes(whole)
+    assert points.restore(Outcome(Verdict.COMPLETED))
+
+
+def test_the_film_goes_on_with_its_next_picture(tmp_path):
+    sim = falling()
+    sim.film = SimpleNamespace(shots=3, next=0.7)
+    kept(tmp_path, sim).write(Outcome(Verdict.COMPLETED))
+    other = falling()
+    other.film = SimpleNamespace(shots=0, next=0.0)
+    assert kept(tmp_path, other).restore(Outcome(Verdict.COMPLETED))
+    assert (other.film.shots, other.film.next) == (3, 0.7)
+
+
+# --- a run's own process
+
+
+def test_a_run_leaves_its_record_series_and_frames(tmp_path):
+    s = scenario(duration=0.05, tick=0.01, output_interval=0.025, spacing=0.02)
+    told = []
+    perform(Job(s.model_dump(mode="json"), "mpm", keep_frames=True, repeat=3), tmp_path, told.append)
+    record, why = read_record(tmp_path)
+    assert why == "" and (record["verdict"], record["repeat"], record["resumed"]) == ("completed", 3, 0)
+    assert set(record["files"]) == {"series.parquet", "final.npz", *(f"frame_000{i}.npz" for i in range(3))}
+    assert [t["time"] for t in told] == pytest.approx([0.0, 0.025, 0.05]) and {t["until"] for t in told} == {0.05}
+    mass = record["measures"]["mass_kg"]
+    assert mass == pytest.approx(1000.0 * 0.08**3, rel=1e-5) and record["print"] == "" and record["success"] == []
+    with np.load(tmp_path / "frame_0001.npz") as frame, np.load(tmp_path / "final.npz") as last:
+        assert float(frame["time"]) == pytest.approx(0.025) and float(last["time"]) == pytest.approx(0.05)
+    import pandas as pd
+
+    series = pd.read_parquet(tmp_path / "series.parquet")
+    assert series["time_s"].tolist() == pytest.approx([0.0, 0.025, 0.05]) and series["mass_kg"].iloc[
+        1
+    ] == pytest.approx(mass)
+    assert set(record["bounds_s"]) == {"acoustic", "advective"} and record["launches"]["process_per_tick"] == 0
+    assert sum(record["binding_s"].values()) == pytest.approx(0.05) and record["input"] == s.model_dump(mode="json")
+
+
+def test_an_estimate_by_hand():
+    """A bead that takes 0.3 of 0.6 s to lay: on average three quarters of the particles are there."""
+    s = bead(duration=0.6)
+
+    class Estimated(Stepping):
+        dt, typical_rate, typical_bytes = 1e-3, 1e4, 200.0
+
+    tick, ticks, _ = s.schedule
+    found = estimate(s, Estimated)
+    substeps = math.ceil(tick / 1e-3 - 1e-9) * ticks
+    assert (found.method, found.refusal, found.substeps) == ("ballistic", None, substeps)
+    assert found.memory_bytes == 200.0 * found.particles and found.bounds[1].formula == repr(s.reference_speed)
+    assert found.wall_s == pytest.approx(substeps * found.particles * 0.75 / 1e4)
+    short = estimate(bead(duration=0.2), Estimated)
+    assert short.wall_s == pytest.approx(short.substeps * short.particles * 0.5 / 1e4)
+    still = estimate(scenario(), Estimated)
+    assert still.wall_s == pytest.approx(still.substeps * still.particles / 1e4)
