@@ -41,8 +41,14 @@ def sliding(method, walls, gravity=-10.0, top=False, speed=0.4, duration=0.03, m
         "size": [0.08, 0.08, 0.08],
         "velocity": [speed, 0, 0],
     }
-    s = scenario(domain={"lower": [0, 0, 0], "upper": [0.4, 0.2, 0.2], "walls": walls}, gravity=[0, 0, gravity], bodies=[body],
-                 material=material, duration=duration, spacing=0.01)  # fmt: skip
+    s = scenario(
+        domain={"lower": [0, 0, 0], "upper": [0.4, 0.2, 0.2], "walls": walls},
+        gravity=[0, 0, gravity],
+        bodies=[body],
+        material=material,
+        duration=duration,
+        spacing=0.01,
+    )
     sim = Simulation(s, method)
     assert sim.run().verdict is Verdict.COMPLETED
     frame = sim.frame()
@@ -77,9 +83,13 @@ def test_a_viscous_block_on_a_sticking_face_is_held(method):
 def test_overlap_seen_on_the_grid_of_mpm_relaxes_at_its_rate():
     """dJ = -J dt 0.1 (c / dx) (J - 1 - 0.001) in a full period at rest, whose density on the grid is that at rest."""
     edge = 0.16
-    s = scenario(domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS}, gravity=[0, 0, 0],
-                 bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}], spacing=0.01,
-                 material={"density": 1000.0, "sound_speed": 4.0, "youngs_modulus": 1e3, "yield_stress": 9.0})  # fmt: skip
+    s = scenario(
+        domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS},
+        gravity=[0, 0, 0],
+        bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}],
+        spacing=0.01,
+        material={"density": 1000.0, "sound_speed": 4.0, "youngs_modulus": 1e3, "yield_stress": 9.0},
+    )
     sim = Simulation(s, "mpm")
     dt = 1e-4
     for start, rate in ((1.05, 0.049), (1.0005, 0.0), (0.97, 0.0)):
@@ -93,10 +103,20 @@ def test_overlap_seen_on_the_grid_of_mpm_relaxes_at_its_rate():
 
 @pytest.mark.parametrize(
     ("method", "field", "value"),
-    [("mpm", "volume_ratio", 1e7), ("mpm", "volume_ratio", 1e-7), ("mpm", "elastic_normal", -5.0), ("mpm", "affine", -1e6),
-     ("sph", "density", 1e8), ("sph", "density", -5e3), ("sph", "elastic_normal", -5.0), ("pbd", "elastic_normal", -5.0),
-     ("mpm", "elastic_normal", 1e7), ("sph", "elastic_normal", 1e7), ("pbd", "elastic_normal", 1e7)],
-)  # fmt: skip
+    [
+        ("mpm", "volume_ratio", 1e7),
+        ("mpm", "volume_ratio", 1e-7),
+        ("mpm", "elastic_normal", -5.0),
+        ("mpm", "affine", -1e6),
+        ("sph", "density", 1e8),
+        ("sph", "density", -5e3),
+        ("sph", "elastic_normal", -5.0),
+        ("pbd", "elastic_normal", -5.0),
+        ("mpm", "elastic_normal", 1e7),
+        ("sph", "elastic_normal", 1e7),
+        ("pbd", "elastic_normal", 1e7),
+    ],
+)
 def test_a_state_that_no_matter_has_is_marked_by_the_pass_that_advances_it(method, field, value):
     """Between two substeps, where no audit looks."""
     sim = Simulation(scenario(material=PASTE, spacing=0.016), method, graphs=False)

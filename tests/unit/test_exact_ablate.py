@@ -99,8 +99,8 @@ def test_an_effect_is_the_largest_shift_and_the_share_of_time():
     assert effect(Change("x", {}), "mpm", run, base).saved == pytest.approx(0.05)
     gone = effect(Change("x", {}), "mpm", finished(measures={"height_m": 0.005}), base)
     assert (gone.length, gone.moved) == ("bead_width_m", 1.0)
-    for run, base in ((finished(verdict="diverged"), base), (run, finished(verdict="error"))):
-        none = effect(Change("x", {}), "mpm", run, base)
+    for after, before in ((finished(verdict="diverged"), base), (run, finished(verdict="error"))):
+        none = effect(Change("x", {}), "mpm", after, before)
         assert none.length == "" and math.isnan(none.moved) and math.isnan(none.saved)
     bare = effect(Change("x", {}), "mpm", finished(), finished())
     assert bare.length == "" and math.isnan(bare.moved) and bare.saved == 0.0
@@ -196,8 +196,11 @@ def test_no_mix_is_sought_of_a_method_that_does_not_run(monkeypatch):
 
 
 def test_what_an_ablation_lacks():
-    done = Ablation({"mpm": finished(verdict="refused")}, [seen("a", 0, 0, verdict="refused"), seen("b", 0, 0, verdict="error")],
-                    {"mpm": seen("c", 0, 0, verdict="timeout")})  # fmt: skip
+    done = Ablation(
+        {"mpm": finished(verdict="refused")},
+        [seen("a", 0, 0, verdict="refused"), seen("b", 0, 0, verdict="error")],
+        {"mpm": seen("c", 0, 0, verdict="timeout")},
+    )
     assert [line.split(": ")[1] for line in done.missing()] == ["refused", "error", "timeout"]
 
 
@@ -233,9 +236,11 @@ def test_the_page_names_what_is_needed_and_the_leanest_mix(tmp_path):
     done = Ablation({"mpm": finished(), "sph": finished("sph", "timeout")}, effects, {"mpm": lean}, ["no way"])
     made = page.report(BEAD, "line_bead", ["seed=3"], done, 0.05, tmp_path)
     assert made.tables[0].rows == [
-        ["a", "mpm", "20.0 %", "height_m", "10.0 %", "needed"], ["b", "mpm", "1.0 %", "height_m", "25.0 %", "droppable"],
-        ["c", "mpm", "0.0 %", "height_m", "0.0 %", "idle"], ["d", "mpm", "-", "height_m", "0.0 %", "error"],
-    ]  # fmt: skip
+        ["a", "mpm", "20.0 %", "height_m", "10.0 %", "needed"],
+        ["b", "mpm", "1.0 %", "height_m", "25.0 %", "droppable"],
+        ["c", "mpm", "0.0 %", "height_m", "0.0 %", "idle"],
+        ["d", "mpm", "-", "height_m", "0.0 %", "error"],
+    ]
     assert made.findings == [
         "sph: the scenario itself ended as timeout.", "no way", "mpm: needed: a; droppable: b.",
         "mpm: leanest within 5%: b: saves 26% of the time, moves height_m by 1.2%. Alone: "

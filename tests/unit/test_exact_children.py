@@ -35,13 +35,19 @@ def job_in(folder, **more):
         (1, True, False, "x", "its process was stopped 120 s after the wall limit of 9 s; raise --wall-limit"),
         (-9, False, True, "", "its process was killed (SIGKILL): the system ran out of memory"),
         (-9, False, False, "", "its process was killed (SIGKILL): by somebody, or by the system for its memory"),
-        (-11, False, False, "", "its process was killed (SIGSEGV): it touched memory that is not its own: please report it"),
+        (
+            -11,
+            False,
+            False,
+            "",
+            "its process was killed (SIGSEGV): it touched memory that is not its own: please report it",
+        ),
         (-99, False, False, "", "its process was killed (signal 99)"),
         (3, False, False, "a\nb\n", "its process ended with code 3: b"),
         (3, False, False, "", "its process ended with code 3: no message"),
         (0, False, False, "a", "its process left no whole record: a"),
     ],
-)  # fmt: skip
+)
 def test_a_post_mortem_says_why(tmp_path, code, timed, starved, log, words):
     (tmp_path / "log.txt").write_text(log)
     job = Job(TABLE, "mpm", wall_limit=9.0)
@@ -69,10 +75,11 @@ def launched(tmp_path, monkeypatch, script, **more):
 
 def test_a_child_reports_progress_and_leaves_its_record(tmp_path, monkeypatch):
     script = (
-        "import sys, json; sys.path.insert(0, %r); from fluidbench.store import write_record; from pathlib import Path\n"
+        f"import sys, json; sys.path.insert(0, {str(Path(run.__file__).parents[1])!r})\n"
+        "from fluidbench.store import write_record; from pathlib import Path\n"
         "folder = Path(sys.argv[1]); table = json.loads((folder / 'job.json').read_text())\n"
         "print('@progress {\"time\": 0.5}'); print('hello'); assert sys.argv[2] == '--attended'\n"
-        "write_record(folder, {'verdict': 'completed', 'repeat': table['repeat']})" % str(Path(run.__file__).parents[1])
+        "write_record(folder, {'verdict': 'completed', 'repeat': table['repeat']})"
     )
     (tmp_path / "run").mkdir()
     for name in ("record.json", "series.parquet", "final.npz", "log.txt"):
@@ -88,7 +95,7 @@ def test_a_child_reports_progress_and_leaves_its_record(tmp_path, monkeypatch):
 
 def test_a_child_that_meets_an_obstacle_or_takes_too_long(tmp_path, monkeypatch):
     *_, launch = launched(tmp_path, monkeypatch, "print('@obstacle the disk is full ')")
-    with pytest.raises(Obstacle, match="^the disk is full$"):
+    with pytest.raises(Obstacle, match=r"^the disk is full$"):
         launch()
     monkeypatch.setattr(run, "GRACE", 0.1)
     *_, launch = launched(tmp_path, monkeypatch, "import time; time.sleep(60)", wall_limit=0.1)
@@ -168,7 +175,7 @@ def test_a_target_in_words_and_its_other_backend():
 
 
 def test_children_find_our_code_before_the_users(monkeypatch, tmp_path):
-    own, standard = str(Path(offspring.__file__).parents[1]), os.path.realpath(os.path.dirname(os.__file__))
+    own, standard = str(Path(offspring.__file__).parents[1]), os.path.realpath(Path(os.__file__).parent)
     monkeypatch.setattr(sys, "path", ["", str(tmp_path), "/x/site-packages", own, standard, f"{standard}/lib-dynload",
                                       "/y/python311.zip", str(tmp_path)])  # fmt: skip
     found = offspring.search_path()

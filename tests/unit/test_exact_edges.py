@@ -1,4 +1,4 @@
-"""Edges of the input that the other tables leave open: other units than one, lower corners that are not zero, exact ends."""
+"""Edges of the input that the other tables leave open: units other than one, lower corners beyond zero, exact ends."""
 
 import importlib
 import math
@@ -47,8 +47,14 @@ def test_sizes_are_counted_in_spacings(d):
 
     cube(0.995)
     refused("bodies and nozzle would be", cube, share=1.0)
-    table = {"domain": {"lower": [-200.0 * d] * 3, "upper": [200.0 * d] * 3}, "spacing": d, "tick": 1.0, "gravity": [0, 0, 0],
-             "toolpath": {"kind": "line", "start": [0, 0], "speed": 0.0, "dwell": 1.0}, "output_interval": 1.0}  # fmt: skip
+    table = {
+        "domain": {"lower": [-200.0 * d] * 3, "upper": [200.0 * d] * 3},
+        "spacing": d,
+        "tick": 1.0,
+        "gravity": [0, 0, 0],
+        "toolpath": {"kind": "line", "start": [0, 0], "speed": 0.0, "dwell": 1.0},
+        "output_interval": 1.0,
+    }
 
     def stream(particles):
         nozzle = {"diameter": 10.0 * d, "flow_rate": 1e6 * d**3, "standoff": d}

@@ -1,4 +1,4 @@
-"""Small experiments: kept, found again, blamed one by one when a process dies; in this process, but for one in its own."""
+"""Small experiments: kept, found again, and blamed one by one when a process dies."""
 
 import json
 import os

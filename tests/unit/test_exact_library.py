@@ -57,8 +57,17 @@ def test_quick_takes_the_files_own_table_or_a_third_more_spacing(tmp_path):
 
 
 def test_overrides_are_toml_or_words():
-    given = {"a=1": ("a", 1), "a.b = 2.5": ("a.b", 2.5), "a=true": ("a", True), "a=[1, 2]": ("a", [1, 2]), "a=x y": ("a", "x y"),
-             "a='x'": ("a", "x"), "a=none": ("a", None), "a= none ": ("a", None), "a=b=c": ("a", "b=c")}  # fmt: skip
+    given = {
+        "a=1": ("a", 1),
+        "a.b = 2.5": ("a.b", 2.5),
+        "a=true": ("a", True),
+        "a=[1, 2]": ("a", [1, 2]),
+        "a=x y": ("a", "x y"),
+        "a='x'": ("a", "x"),
+        "a=none": ("a", None),
+        "a= none ": ("a", None),
+        "a=b=c": ("a", "b=c"),
+    }
     assert {text: parse_override(text) for text in given} == given
     for text in ("a", "=3", " =3"):
         with pytest.raises(UserError, match="--set takes key=value"):
@@ -75,9 +84,16 @@ def test_keys_reach_into_tables_and_lists():
     assign(table, "a.b", None)
     assign(table, "gone", None)
     assert table == {"a": {"c": {"d": 4}}, "l": [{"x": 5}, 6], "e": 7}
-    for key, words in (("l.2", "must be a number below 2"), ("l.x.y", "must be a number below 2"), ("l.-1", "a number below 2"),
-                       ("e.x", "is a value, not a table"), ("a..b", "names joined by dots"), ("", "names joined by dots"),
-                       ("l." + "0" * 10, "a number below 2"), (".".join("k" * 34), "names joined by dots")):  # fmt: skip
+    for key, words in (
+        ("l.2", "must be a number below 2"),
+        ("l.x.y", "must be a number below 2"),
+        ("l.-1", "a number below 2"),
+        ("e.x", "is a value, not a table"),
+        ("a..b", "names joined by dots"),
+        ("", "names joined by dots"),
+        ("l." + "0" * 10, "a number below 2"),
+        (".".join("k" * 34), "names joined by dots"),
+    ):
         with pytest.raises(UserError, match=words):
             assign(table, key, 1)
     assign(table, "l." + "0" * 9, 8)
@@ -91,8 +107,10 @@ def test_mistakes_are_told_five_at_a_time():
     assert len(str(error.value).splitlines()) == 6 and str(error.value).endswith("here: and 3 more mistakes")
     with pytest.raises(UserError) as error:
         library.validate({"wrong": 1, "spacing": 1.0, "duration": 1.0, "material": {"density": 1.0}}, "here")
-    assert str(error.value).splitlines() == ["here: 'domain' is missing", "here: unknown key 'wrong'; known: " + ", ".join(
-        sorted(library.Scenario.model_fields))]  # fmt: skip
+    assert str(error.value).splitlines() == [
+        "here: 'domain' is missing",
+        "here: unknown key 'wrong'; known: " + ", ".join(sorted(library.Scenario.model_fields)),
+    ]
     assert library._short("x" * 200) == "x" * 200 and library._short("x" * 201) == "x" * 200 + "..."
 
 

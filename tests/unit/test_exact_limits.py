@@ -81,8 +81,14 @@ def test_pools_and_bodies_are_addressable():
 def test_a_stream_counts_what_the_nozzle_gives_and_holds():
     """Q T / d^3 and (D / d + 5)^2 in it: of 537 million, with d = 1 and 100 spacings across."""
     most, inside = 8 * ADDRESSABLE, 105**2
-    table = {"domain": {"lower": [-200.0] * 3, "upper": [200.0] * 3}, "spacing": 1.0, "tick": 1.0, "gravity": [0, 0, 0],
-             "toolpath": {"kind": "line", "start": [0, 0], "speed": 0.0, "dwell": 1.0}, "output_interval": 1.0}  # fmt: skip
+    table = {
+        "domain": {"lower": [-200.0] * 3, "upper": [200.0] * 3},
+        "spacing": 1.0,
+        "tick": 1.0,
+        "gravity": [0, 0, 0],
+        "toolpath": {"kind": "line", "start": [0, 0], "speed": 0.0, "dwell": 1.0},
+        "output_interval": 1.0,
+    }
 
     def stream(duration):
         return bead(nozzle={"diameter": 100.0, "flow_rate": 1.0e6, "standoff": 1.0}, duration=duration, **table)
@@ -161,10 +167,11 @@ def test_a_periodic_axis_needs_six_spacings():
 
 
 USUAL = [
-    ("material.density", {"density": 1.0}, "density", 10, 2e4), ("material.youngs_modulus", {"density": 1000.0}, "youngs_modulus", 10, 1e12),
+    ("material.density", {"density": 1.0}, "density", 10, 2e4),
+    ("material.youngs_modulus", {"density": 1000.0}, "youngs_modulus", 10, 1e12),
     ("material.viscosity", {"density": 1000.0}, "viscosity", 1e-6, 1e6),
     ("material.yield_stress", {"density": 1000.0, "youngs_modulus": 1e6}, "yield_stress", 1e-2, 1e8),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "table", "key", "low", "high"), USUAL, ids=[row[0] for row in USUAL])
@@ -189,9 +196,12 @@ def test_unusual_sizes_and_speeds_are_warned_about():
     def sized(factor):
         """A bead 0.1 mm to 0.5 m wide, and so on: the same scenario in other units."""
         s = bead()
-        return s.model_copy(update={
-            "spacing": s.spacing * factor, "nozzle": s.nozzle.model_copy(update={"diameter": s.nozzle.diameter * factor}),
-        })  # fmt: skip
+        return s.model_copy(
+            update={
+                "spacing": s.spacing * factor,
+                "nozzle": s.nozzle.model_copy(update={"diameter": s.nozzle.diameter * factor}),
+            }
+        )
 
     assert "spacing" not in warned(sized(5e-3)) and "spacing" in warned(sized(4.9e-3))
     assert "spacing" not in warned(sized(100.0)) and "spacing" in warned(sized(101.0))

@@ -33,7 +33,7 @@ def test_shares(text, value):
 
 @pytest.mark.parametrize("text", ["1000%", "9.9e-7", "0", "-5%", "nan", "inf", "five", "", "%", "10"])
 def test_what_is_no_share(text):
-    with pytest.raises(UserError, match="takes a share such as 5% or 0.05"):
+    with pytest.raises(UserError, match=r"takes a share such as 5% or 0\.05"):
         app.fraction(text)
 
 
@@ -47,11 +47,19 @@ def test_a_share_above_one_needs_its_sign():
 @pytest.mark.parametrize(
     ("text", "budget"),
     [
-        (None, (math.inf, math.inf)), ("", (math.inf, math.inf)), ("None", (math.inf, math.inf)),
-        ("realtime", (math.inf, 1.0)), (" RealTime ", (math.inf, 1.0)), ("60s", (60.0, math.inf)), ("60", (60.0, math.inf)),
-        ("5m", (300.0, math.inf)), ("1.5H", (5400.0, math.inf)), ("0.001", (1e-3, math.inf)), ("3.2e7", (YEAR, math.inf)),
+        (None, (math.inf, math.inf)),
+        ("", (math.inf, math.inf)),
+        ("None", (math.inf, math.inf)),
+        ("realtime", (math.inf, 1.0)),
+        (" RealTime ", (math.inf, 1.0)),
+        ("60s", (60.0, math.inf)),
+        ("60", (60.0, math.inf)),
+        ("5m", (300.0, math.inf)),
+        ("1.5H", (5400.0, math.inf)),
+        ("0.001", (1e-3, math.inf)),
+        ("3.2e7", (YEAR, math.inf)),
     ],
-)  # fmt: skip
+)
 def test_budgets(text, budget):
     assert app.budget_of(text) == budget
 
@@ -76,7 +84,7 @@ def test_positive_numbers_and_seconds():
         assert app.seconds(value, "--x") == value
     assert app.seconds(0.0, "--x", zero=True) == 0.0
     for value in (0.99e-3, 1.01 * YEAR):
-        with pytest.raises(UserError, match="--x takes seconds, from 0.001 up to a year"):
+        with pytest.raises(UserError, match=r"--x takes seconds, from 0\.001 up to a year"):
             app.seconds(value, "--x")
     with pytest.raises(UserError, match="positive"):
         app.seconds(0.0, "--x")
@@ -117,8 +125,17 @@ def test_targets_threads_and_jobs(monkeypatch):
         with pytest.raises(UserError, match=words):
             call()
     assert app.one_target("cpu", "taichi", 2).threads == 2
-    assert [app.workers_for(j, t) for j, t in ((None, Target()), (None, Target(backend="taichi", threads=2)), (16, Target()),
-            (None, Target(backend="taichi", threads=3)), (None, Target("cuda:0")), (3, Target("cuda:0")))] == [2, 1, 16, 1, 1, 3]  # fmt: skip
+    assert [
+        app.workers_for(j, t)
+        for j, t in (
+            (None, Target()),
+            (None, Target(backend="taichi", threads=2)),
+            (16, Target()),
+            (None, Target(backend="taichi", threads=3)),
+            (None, Target("cuda:0")),
+            (3, Target("cuda:0")),
+        )
+    ] == [2, 1, 16, 1, 1, 3]
     assert app.targets_of("cpu", "warp", 1) == [Target()]
     assert app.targets_of("cpu", "warp,taichi", 2) == [Target(), Target(backend="taichi", threads=2)]
     with pytest.raises(UserError, match="--threads 2 is for taichi"):

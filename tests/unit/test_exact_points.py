@@ -1,5 +1,6 @@
 """Points of the study of stability: axes, tasks, what a point measures, and the findings."""
 
+import itertools
 import math
 from types import SimpleNamespace
 
@@ -62,14 +63,10 @@ def test_axes_go_by_decades_or_halves_of_them():
     """Consecutive values, where they are not zero: a factor of 10 or 100, or 3 and 10 / 3 in turn."""
     for name in ("viscosity", "youngs_modulus", "yield_stress", "density", "exit_speed"):
         values = [v for v in AXES[name].values if v > 0]
-        steps = {round(b / a, 2) for a, b in zip(values[:-1], values[1:], strict=True)}
+        steps = {round(b / a, 2) for a, b in itertools.pairwise(values)}
         assert steps <= {10.0, 100.0, 3.0, 3.33} and values[0] == pytest.approx(10 ** round(math.log10(values[0])))
     counts = AXES["particles_per_cell"].values
-    assert (
-        counts[0] == 1
-        and counts[-1] == 27
-        and [b / a for a, b in zip(counts[:3], counts[1:4], strict=True)] == [2.0] * 3
-    )
+    assert counts[0] == 1 and counts[-1] == 27 and [b / a for a, b in pairwise(counts[:4])] == [2.0] * 3
     assert AXES["spacing"].values == pytest.approx((1 / 3, 1 / 2, 1, 2, 8 / 3))
     assert AXES["poisson_ratio"].values == (0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499)
 
@@ -226,11 +223,14 @@ def test_findings_count_and_compare():
         {"axis": "density", "method": "mpm", "value": v, "verdict": w, "reason": r, "dt_own_s": dt, "binding": "b"}
         for v, w, r, dt in ((1.0, "held", "", 4.0), (2.0, "failed", "boom", 1.0), (3.0, "held", "", 2.0))
     ]  # fmt: skip
-    points += [{"axis": "spacing", "method": "sph", "value": 1.0, "verdict": "refused", "reason": "no"},
-               {"axis": "spacing", "method": "mpm", "value": 1.0, "verdict": "held", "reason": "", "dt_own_s": 3.0},
-               {"axis": "spacing", "method": "mpm", "value": 2.0, "verdict": "held", "reason": "", "dt_own_s": 4.4}]  # fmt: skip
+    points += [
+        {"axis": "spacing", "method": "sph", "value": 1.0, "verdict": "refused", "reason": "no"},
+        {"axis": "spacing", "method": "mpm", "value": 1.0, "verdict": "held", "reason": "", "dt_own_s": 3.0},
+        {"axis": "spacing", "method": "mpm", "value": 2.0, "verdict": "held", "reason": "", "dt_own_s": 4.4},
+    ]
     assert findings(points, blocks) == [
-        "mpm, acoustic block: stable up to dt = 3 s, 0.75 of theory; the method's own bound is 0.50 of what was measured.",
+        "mpm, acoustic block: stable up to dt = 3 s, 0.75 of theory; the method's own bound is 0.50 of what was "
+        "measured.",
         "sph, viscous block: error: it died.",
         "Default steps: 6 points tried, 4 held, 1 refused, 1 failed.",
         "mpm: density narrows the step 4-fold, from 4 s at 1 to 1 s at 2 (bound: b).",

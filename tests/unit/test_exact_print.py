@@ -87,8 +87,8 @@ def test_what_lies_beyond_the_field_is_empty():
     half = Deposit(whole.origin, D, whole.fill[: len(whole.fill) // 2])
     heights = tower.path_heights(half, s)
     assert heights[:17] == pytest.approx(np.full(17, 18 * D)) and heights[20:] == pytest.approx(np.zeros(18))
-    late = Deposit(whole.origin + [72 * D, 0, 0], D, whole.fill[72:])  # from the first column of sector 20 on
-    aside = Deposit(whole.origin + [0, 2 * D, 0], D, whole.fill[:, 2:])  # the path is over its first column
+    late = Deposit(whole.origin + np.array([72 * D, 0, 0]), D, whole.fill[72:])  # from the first column of sector 20 on
+    aside = Deposit(whole.origin + np.array([0, 2 * D, 0]), D, whole.fill[:, 2:])  # the path is over its first column
     assert tower.path_heights(aside, s) == pytest.approx(np.full(38, 18 * D))
     heights = tower.path_heights(late, s)
     assert heights[:17] == pytest.approx(np.zeros(17)) and heights[20:] == pytest.approx(np.full(18, 18 * D))
@@ -169,11 +169,18 @@ HEIGHT, STANDS, LAID = "height over plan", "share of the path that stands", "lay
         ({"after": (0.0, 0.0)}, Print.SOUND, ["sunk after the last layer"]),
         ({"end": 6.2 * (1 - 1.1e-6)}, Print.INCOMPLETE, ["path travelled", "sunk after the last layer"]),
         ({"end": 6.2 * (1 - 0.9e-6)}, Print.SOUND, ["sunk after the last layer"]),
-        ({"print_standing": 0.1, "layer_1_continuity": 0.1}, Print.COLLAPSED, [STANDS, "continuity of the worst layer"]),
-        ({"layer_1_continuity": 0.1, "after": (1.0, 0.5)}, Print.BROKEN,
-         ["continuity of the worst layer", "sunk after the last layer"]),
+        (
+            {"print_standing": 0.1, "layer_1_continuity": 0.1},
+            Print.COLLAPSED,
+            [STANDS, "continuity of the worst layer"],
+        ),
+        (
+            {"layer_1_continuity": 0.1, "after": (1.0, 0.5)},
+            Print.BROKEN,
+            ["continuity of the worst layer", "sunk after the last layer"],
+        ),
     ],
-)  # fmt: skip
+)
 def test_every_condition_alone_and_the_worst_is_the_verdict(changes, verdict, unmet):
     assert failed(**changes) == (verdict, unmet)
 

@@ -17,9 +17,12 @@ LIMITED = case(tolerance=0.1, fine_tolerance=0.02, tolerances={"sph": 0.3})
 def known():
     """A method at two spacings, one that timed out, and a law."""
     of = case("drop", tolerance=0.1, causes={"mpm": "a|b"})
-    rows = [trial(of, "mpm", 0.0421, wall=3.0), trial(of, "mpm", 0.168, wall=1.0, spacing=0.02, verdict="MISS", note="a|b"),
-            trial(of, "sph", verdict="timeout", note="slow"),
-            trial(case("law", "numerics", drive=lambda dt: None), "law", 1e-7)]  # fmt: skip
+    rows = [
+        trial(of, "mpm", 0.0421, wall=3.0),
+        trial(of, "mpm", 0.168, wall=1.0, spacing=0.02, verdict="MISS", note="a|b"),
+        trial(of, "sph", verdict="timeout", note="slow"),
+        trial(case("law", "numerics", drive=lambda dt: None), "law", 1e-7),
+    ]
     machine = {
         "time": "2026-01-02T03:04:05",
         "fluidbench": "0.1",
@@ -83,8 +86,11 @@ def test_results_are_written_with_their_numbers(tmp_path):
 def test_profiles_are_of_the_finest_and_work_precision_goes_by_cost():
     rows = known()
     for i, t in enumerate(rows[:2]):
-        t.finding = Finding(t.error, (), (Curve("u of z", "z", "u", np.array([float(i)]), np.array([9.0]), np.array([5.0]),
-                                                np.array([6.0])),))  # fmt: skip
+        t.finding = Finding(
+            t.error,
+            (),
+            (Curve("u of z", "z", "u", np.array([float(i)]), np.array([9.0]), np.array([5.0]), np.array([6.0])),),
+        )
     (plot,) = page.profiles(rows[:3])
     assert [(t.label, list(t.x)) for t in plot.traces] == [("reference", [5.0]), ("mpm", [0.0])]
     (line,) = page.work_precision(rows[:3]).traces

@@ -32,8 +32,14 @@ def test_a_run_is_its_scenario_method_target_repeat_and_variant():
     same = [Job(TABLE, "mpm", wall_limit=5.0), Job(TABLE, "mpm", keep_frames=True), Job(TABLE, "mpm", film_every=0.1),
             Job(TABLE, "mpm", checkpoint_every=1.0)]  # fmt: skip
     assert {job.key for job in same} == {first.key}
-    other = [Job(TABLE, "sph"), Job(TABLE, "mpm", repeat=1), Job(TABLE, "mpm", variant="v"), Job(TABLE | {"seed": 1}, "mpm"),
-             Job(TABLE, "mpm", Target(backend="taichi")), Job(TABLE, "mpm", Target(backend="taichi", threads=2))]  # fmt: skip
+    other = [
+        Job(TABLE, "sph"),
+        Job(TABLE, "mpm", repeat=1),
+        Job(TABLE, "mpm", variant="v"),
+        Job(TABLE | {"seed": 1}, "mpm"),
+        Job(TABLE, "mpm", Target(backend="taichi")),
+        Job(TABLE, "mpm", Target(backend="taichi", threads=2)),
+    ]
     assert len({job.key for job in [first, *other]}) == 7
     assert first.heading() == {
         "scenario": "line_bead", "method": "mpm", "device": "cpu", "backend": "warp", "threads": 1, "repeat": 0,

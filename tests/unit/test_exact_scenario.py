@@ -36,8 +36,12 @@ def test_the_reference_speed_is_the_fastest_that_the_scenario_implies():
 def test_the_reference_speed_of_a_print_and_of_foam():
     assert bead(gravity=[0, 0, 0]).reference_speed == pytest.approx(math.hypot(0.1, 0.1))
     path = {"kind": "line", "start": [0, 0], "end": [0.03, 0], "speed": 0.1, "layers": 2, "layer_height": 0.005}
-    tall = bead(toolpath=path, gravity=[0, 0, -20.0], domain={"lower": [-0.02, -0.02, -0.1], "upper": [0.05, 0.02, 0.025]},
-                nozzle={"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.110})  # fmt: skip
+    tall = bead(
+        toolpath=path,
+        gravity=[0, 0, -20.0],
+        domain={"lower": [-0.02, -0.02, -0.1], "upper": [0.05, 0.02, 0.025]},
+        nozzle={"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.110},
+    )
     assert tall.reference_speed == pytest.approx(math.sqrt(20.0 * 0.115))
     foam = {"density": 1.0, "expansion": {"ratio": 61.0, "time": 0.5}}
     assert boxed(material=foam).reference_speed == pytest.approx(HALF * 60 / 1.5)

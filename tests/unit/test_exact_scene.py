@@ -88,14 +88,17 @@ def test_worlds_may_differ_in_material_gravity_and_seed_only():
 
 
 KINDS = {
-    "liquid": ({"density": 1.0}, ()), "oil": ({"density": 1.0, "viscosity": 1.0}, ("viscous",)),
+    "liquid": ({"density": 1.0}, ()),
+    "oil": ({"density": 1.0, "viscosity": 1.0}, ("viscous",)),
     "paste": ({"density": 1.0, "youngs_modulus": 9.0, "yield_stress": 1.0}, ("elastic", "flowing")),
     "solid": ({"density": 1.0, "youngs_modulus": 9.0}, ("elastic", "solid")),
-    "setting": ({"density": 1.0, "youngs_modulus": 9.0, "yield_stress": 1.0, "cure": {"yield_stress": 9.0, "viscosity": 1.0}},
-                ("elastic", "solid", "flowing", "viscous", "cures", "changes")),
+    "setting": (
+        {"density": 1.0, "youngs_modulus": 9.0, "yield_stress": 1.0, "cure": {"yield_stress": 9.0, "viscosity": 1.0}},
+        ("elastic", "solid", "flowing", "viscous", "cures", "changes"),
+    ),
     "growing": ({"density": 1.0, "expansion": {"ratio": 2.0}}, ("grows", "expands", "changes")),
     "spawning": ({"density": 1.0, "expansion": {"ratio": 2.0, "kind": "spawn"}}, ("expands", "changes")),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", KINDS)

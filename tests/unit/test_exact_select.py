@@ -44,8 +44,14 @@ def test_known_answers_are_of_the_scenarios_physics(made, classes):
 
 
 def test_trust_is_more_than_half_of_the_answers_of_this_physics(monkeypatch):
-    rows = [("mpm", "yield stress", 0.1, 0.1), ("mpm", "emission", 0.2, 0.1), ("mpm", "liquid", 0.9, 0.1),
-            ("sph", "emission", 0.05, 0.1), ("sph", "emission", 0.05, 0.1), ("sph", "yield stress", math.nan, 0.1)]  # fmt: skip
+    rows = [
+        ("mpm", "yield stress", 0.1, 0.1),
+        ("mpm", "emission", 0.2, 0.1),
+        ("mpm", "liquid", 0.9, 0.1),
+        ("sph", "emission", 0.05, 0.1),
+        ("sph", "emission", 0.05, 0.1),
+        ("sph", "yield stress", math.nan, 0.1),
+    ]
     table = pd.DataFrame(rows, columns=["method", "physics", "error", "tolerance"])
     monkeypatch.setattr(module, "reference", lambda name: {"known_answers": table}[name])
     found = trust_of(BEAD, ["mpm", "sph", "pbd"])

@@ -145,9 +145,11 @@ def test_what_a_method_cannot_do_is_refused_by_name():
 
 def test_settings_of_methods_are_read_or_refused():
     assert configure(get_solver("mpm"), scenario(numerics={"mpm": {"safety": 0.5}})).safety == 0.5
-    for numerics, words in (({"mpn": {}}, "numerics.mpn: no method of that name; did you mean 'mpm'"),
-                            ({"mpm": {"safty": 1}}, "numerics.mpm: unknown key 'safty'; did you mean 'safety'"),
-                            ({"mpm": {"safety": 2.0}}, r"numerics.mpm.safety: .*less than or equal to 1 \(got 2.0\)")):  # fmt: skip
+    for numerics, words in (
+        ({"mpn": {}}, "numerics.mpn: no method of that name; did you mean 'mpm'"),
+        ({"mpm": {"safty": 1}}, "numerics.mpm: unknown key 'safty'; did you mean 'safety'"),
+        ({"mpm": {"safety": 2.0}}, r"numerics.mpm.safety: .*less than or equal to 1 \(got 2.0\)"),
+    ):
         with pytest.raises(UserError, match=words):
             scenario(numerics=numerics)
     with pytest.raises(UserError, match="no solver named 'mpn'; did you mean 'mpm'"):

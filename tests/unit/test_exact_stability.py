@@ -66,10 +66,18 @@ def test_theory_of_sph_is_the_fourier_analysis_at_its_smoothing_length():
 
 
 def test_bare_is_without_what_theory_does_not_know():
-    assert {"sph": dict.fromkeys(
-        ("density_diffusion", "density_feedback", "artificial_viscosity", "artificial_viscosity_solid", "artificial_stress"),
-        0.0,
-    )} == BARE  # fmt: skip
+    assert {
+        "sph": dict.fromkeys(
+            (
+                "density_diffusion",
+                "density_feedback",
+                "artificial_viscosity",
+                "artificial_viscosity_solid",
+                "artificial_stress",
+            ),
+            0.0,
+        )
+    } == BARE
     assert BLOCKS["acoustic"] == {"density": 1000.0, "sound_speed": 10.0}
 
 

@@ -21,12 +21,20 @@ def test_numbers_have_four_digits_and_spreads_one():
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("bead_width_m", "bead width [m]"), ("bead_area_m2", "bead area [m²]"), ("mass_kg", "mass [kg]"),
-        ("kinetic_energy_J", "kinetic energy [J]"), ("wall_s", "wall [s]"), ("peak_memory_MiB", "peak memory [MiB]"),
-        ("steps_per_s", "steps per s"), ("particle_substeps_per_cpu_s", "particle substeps per cpu s"),
-        ("wall_per_simulated_s", "wall per simulated s"), ("slump", "slump"), ("m", "m"), ("print_standing", "print standing"),
+        ("bead_width_m", "bead width [m]"),
+        ("bead_area_m2", "bead area [m²]"),
+        ("mass_kg", "mass [kg]"),
+        ("kinetic_energy_J", "kinetic energy [J]"),
+        ("wall_s", "wall [s]"),
+        ("peak_memory_MiB", "peak memory [MiB]"),
+        ("steps_per_s", "steps per s"),
+        ("particle_substeps_per_cpu_s", "particle substeps per cpu s"),
+        ("wall_per_simulated_s", "wall per simulated s"),
+        ("slump", "slump"),
+        ("m", "m"),
+        ("print_standing", "print standing"),
     ],
-)  # fmt: skip
+)
 def test_keys_in_words(key, words):
     assert label(key) == words
 
@@ -58,8 +66,13 @@ def answer(**more):
 
 
 def test_errors_are_percents_but_where_they_are_absolute():
-    runs = [finished(answers=[answer(), answer(measure="absolute, of T"), answer(measure="in discs"), answer(measure="RMS")],
-                     not_compared=["why"]), finished(answers=[answer()], repeat=1, not_compared=["why", "also"])]  # fmt: skip
+    runs = [
+        finished(
+            answers=[answer(), answer(measure="absolute, of T"), answer(measure="in discs"), answer(measure="RMS")],
+            not_compared=["why"],
+        ),
+        finished(answers=[answer()], repeat=1, not_compared=["why", "also"]),
+    ]
     table = against_reference(runs)
     assert [row[4] for row in table.rows] == ["12.50 %", "0.1250", "0.1250", "12.50 %"]
     assert table.rows[0] == ["q", "mpm", "1.235", "2", "12.50 %", "relative", "s"]
@@ -126,8 +139,10 @@ def test_backends_are_compared_where_there_are_two():
 
 def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
     def runs(speeds, **more):
-        made = [finished(steps_per_s=s, simulated_to_real=s / 1000, mean_dt_s=2e-4, key="k", folder=tmp_path / "r", **more)
-                for s in speeds]  # fmt: skip
+        made = [
+            finished(steps_per_s=s, simulated_to_real=s / 1000, mean_dt_s=2e-4, key="k", folder=tmp_path / "r", **more)
+            for s in speeds
+        ]
         for run in made:
             run.record["cost"] |= {"peak_particles": 1234}
             run.record.update(launches={"per_substep": 4}, bytes={"a": 10, "b": 32})
@@ -152,7 +167,7 @@ def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
 
 
 def test_the_page_of_the_table_counts_its_verdicts(tmp_path):
-    rows = known("mpm", 4, 0, "elastic") + [trial(case("g0", "elastic"), "mpm", spacing=0.02, wall=2.0)]
+    rows = [*known("mpm", 4, 0, "elastic"), trial(case("g0", "elastic"), "mpm", spacing=0.02, wall=2.0)]
     e = evidence(rows, repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0))
     for run in e.runs():
         run.record["key"] = "k"
@@ -175,9 +190,10 @@ def test_the_page_of_stability_draws_limits_and_marks_what_has_none():
     points = [point | {"value": 10.0}, point | {"value": 0.0, "lump_limit_found": False},
               {"axis": "density", "method": "sph", "value": 5.0, "verdict": "refused", "reason": "no"}]  # fmt: skip
     assert stability_page._points(points).rows == [
-        ["density", "10", "mpm", "held", "1", "b", "2", "-", "3"], ["density", "0", "mpm", "held", "1", "b", "> 2", "-", "3"],
+        ["density", "10", "mpm", "held", "1", "b", "2", "-", "3"],
+        ["density", "0", "mpm", "held", "1", "b", "> 2", "-", "3"],
         ["density", "5", "sph", "refused", "-", "-", "-", "-", "-"],
-    ]  # fmt: skip
+    ]
     (plot,) = stability_page._maps(points)
     assert [(t.label, list(t.x), list(t.y)) for t in plot.traces] == [
         ("mpm", [10.0], [2.0]), ("mpm, theory", [10.0], [3.0]), ("mpm, own bound", [10.0], [1.0]),

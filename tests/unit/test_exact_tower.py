@@ -71,18 +71,27 @@ def test_sectors_are_three_spacings_and_leave_the_ends_out(made, margin, count):
 def test_coordinates_along_a_path_of_legs():
     """Left of the direction of travel is positive; the nearest leg counts."""
     points = {
-        (0.15, 0.02, 0.0): (0.375, 0.02, 0.01), (0.15, -0.02, 0.005): (0.375, -0.02, 0.015),
-        (0.28, 0.06, -0.01): (0.9, 0.02, 0.0), (0.33, 0.05, 0.0): (0.875, -0.03, 0.01),
-        (-0.05, 0.01, 0.0): (0.0, 0.01, 0.01), (0.29, 0.15, 0.0): (1.0, 0.01, 0.01), (0.28, 0.019, 0.0): (0.7, 0.019, 0.01),
-    }  # fmt: skip
+        (0.15, 0.02, 0.0): (0.375, 0.02, 0.01),
+        (0.15, -0.02, 0.005): (0.375, -0.02, 0.015),
+        (0.28, 0.06, -0.01): (0.9, 0.02, 0.0),
+        (0.33, 0.05, 0.0): (0.875, -0.03, 0.01),
+        (-0.05, 0.01, 0.0): (0.0, 0.01, 0.01),
+        (0.29, 0.15, 0.0): (1.0, 0.01, 0.01),
+        (0.28, 0.019, 0.0): (0.7, 0.019, 0.01),
+    }
     got = np.stack(tower._path_coordinates(np.array(list(points)), ELL), axis=1)
     assert got == pytest.approx(np.array(list(points.values())))
 
 
 def test_coordinates_around_a_ring():
     """A quarter turn is a quarter of the path; outside is positive; just before the start the share is nearly 1."""
-    points = {(0.15, -0.2): (0.0, 0.0), (0.1, -0.12): (0.25, 0.03), (0.07, -0.2): (0.5, -0.02), (0.1, -0.25): (0.75, 0.0),
-              (0.1 + 0.05 * math.cos(-0.1), -0.2 + 0.05 * math.sin(-0.1)): (1 - 0.1 / (2 * math.pi), 0.0)}  # fmt: skip
+    points = {
+        (0.15, -0.2): (0.0, 0.0),
+        (0.1, -0.12): (0.25, 0.03),
+        (0.07, -0.2): (0.5, -0.02),
+        (0.1, -0.25): (0.75, 0.0),
+        (0.1 + 0.05 * math.cos(-0.1), -0.2 + 0.05 * math.sin(-0.1)): (1 - 0.1 / (2 * math.pi), 0.0),
+    }
     x = np.array([[*p, 0.02] for p in points])
     along, across, up = tower._path_coordinates(x, RING)
     assert np.stack([along, across], axis=1) == pytest.approx(np.array(list(points.values())), abs=1e-12)
@@ -115,9 +124,9 @@ def test_material_is_of_the_layer_during_which_it_left_the_nozzle():
     births = [0.5, 2.0, 2.1, 2.1 + 1e-6, 4.0, 4.3, 6.2]
     made = frame(np.zeros((7, 3)), births)
     assert layer_of(made, wall()).tolist() == [0, 0, 0, 1, 1, 2, 2]
-    assert layer_of(made | {"held": np.array([CARRIED, FREE, CLAMPED, CARRIED, FREE, FREE, FREE])}, wall()).tolist() == [
-        -1, 0, 0, -1, 1, 2, 2
-    ]  # fmt: skip
+    assert layer_of(
+        made | {"held": np.array([CARRIED, FREE, CLAMPED, CARRIED, FREE, FREE, FREE])}, wall()
+    ).tolist() == [-1, 0, 0, -1, 1, 2, 2]
 
 
 def test_a_layer_is_measured_in_the_middle_of_its_path():
@@ -139,13 +148,13 @@ def test_a_ring_has_a_radius_and_a_drift():
     """Four points 3 mm outside and, of a third of the mass, 1 mm inside, moved by (3, 4) mm: the drift is 5 mm."""
     turn = np.arange(400) * 2 * np.pi / 400
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    flat = np.concatenate([0.053 * circle, 0.049 * circle]) + [0.1, -0.2]
+    flat = [*np.concatenate([0.053 * circle, 0.049 * circle]), 0.1, -0.2]
     mass = np.repeat([3.0, 1.0], 400)
     still = measure_tower(frame(np.column_stack([flat, np.zeros(800)]), 0.5, mass), RING)
     assert still["layer_1_radius_m"] == pytest.approx(0.052) and still["layer_1_drift_m"] == pytest.approx(
         0.0, abs=1e-12
     )
-    moved = measure_tower(frame(np.column_stack([flat + [3e-3, 4e-3], np.zeros(800)]), 0.5, mass), RING)
+    moved = measure_tower(frame(np.column_stack([flat + np.array([3e-3, 4e-3]), np.zeros(800)]), 0.5, mass), RING)
     assert moved["layer_1_drift_m"] == pytest.approx(5e-3)
 
 

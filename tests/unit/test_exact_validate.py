@@ -52,8 +52,10 @@ def test_trials_are_planned_at_every_level():
     full = case(scenarios=scenarios, quick=0.02, skipped={"pbd": "why not"}, exempt={"sph": "not expected"})
     made = plan([full], ["mpm", "sph", "pbd"], ["coarse", "medium"], False, Target(), 5.0)
     assert [(t.method, t.level, t.spacing) for t in made] == [
-        (m, level, pytest.approx(d)) for level, d in (("coarse", 0.01), ("medium", 0.01 / 1.5)) for m in ("mpm", "sph", "pbd")
-    ]  # fmt: skip
+        (m, level, pytest.approx(d))
+        for level, d in (("coarse", 0.01), ("medium", 0.01 / 1.5))
+        for m in ("mpm", "sph", "pbd")
+    ]
     assert (made[2].verdict, made[2].note, made[2].jobs) == ("skipped", "why not", {})
     first = made[0].jobs
     assert list(first) == ["a", "b"] and first["b"].scenario["seed"] == 1 and first["a"].keep_frames
@@ -137,8 +139,21 @@ def test_cases_are_chosen_by_name_in_order_of_physics():
     assert [c.name for c in select(["slump_slip", "free_fall"])] == ["slump_slip", "free_fall"]
     assert select([]) == list(cases().values())
     order = list(dict.fromkeys(c.physics for c in cases().values()))
-    assert order == [p for p in ("kinematics", "emission", "liquid", "viscous", "yield stress", "elastic", "viscoelastic",
-                                 "process", "numerics") if p in order]  # fmt: skip
+    assert order == [
+        p
+        for p in (
+            "kinematics",
+            "emission",
+            "liquid",
+            "viscous",
+            "yield stress",
+            "elastic",
+            "viscoelastic",
+            "process",
+            "numerics",
+        )
+        if p in order
+    ]
 
 
 def test_orders_are_of_every_case_and_method_with_two_spacings():
@@ -162,7 +177,7 @@ def test_a_trial_is_judged_with_its_last_run(monkeypatch, tmp_path):
     of = case(evaluate=lambda found: Finding(0.01 * len(found)), scenarios=scenarios)
     rows = plan([of], ["mpm", "sph"], ["coarse"], False, Target(), 5.0)
     law = case("law", drive=lambda dt: Finding(3 * dt))
-    rows += plan([law], [], ["coarse"], False, Target(), None) + [trial(of, "pbd", verdict="skipped")]
+    rows += [*plan([law], [], ["coarse"], False, Target(), None), trial(of, "pbd", verdict="skipped")]
     rows[-1].runs = {}
     told = []
 
@@ -177,9 +192,14 @@ def test_a_trial_is_judged_with_its_last_run(monkeypatch, tmp_path):
 
     monkeypatch.setattr(module, "execute", execute)
     module.run(
-        rows, None, 3, lambda i, t, reused: told.append(f"{i} {t.method} starts"), lambda i, _: told.append(f"{i} goes on"),
-        lambda i: told.append(f"{i} stops"), lambda t: told.append(f"{t.method} {t.verdict}"),
-    )  # fmt: skip
+        rows,
+        None,
+        3,
+        lambda i, t, reused: told.append(f"{i} {t.method} starts"),
+        lambda i, _: told.append(f"{i} goes on"),
+        lambda i: told.append(f"{i} stops"),
+        lambda t: told.append(f"{t.method} {t.verdict}"),
+    )
     assert told == [
         "law pass", "pbd skipped", "1 mpm starts", "1 goes on", "1 stops", "2 sph starts", "2 goes on", "2 stops",
         "0 mpm starts", "0 goes on", "0 stops", "mpm pass", "3 sph starts", "3 goes on", "3 stops", "sph pass",
