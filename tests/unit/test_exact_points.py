@@ -66,7 +66,7 @@ def test_axes_go_by_decades_or_halves_of_them():
         steps = {round(b / a, 2) for a, b in itertools.pairwise(values)}
         assert steps <= {10.0, 100.0, 3.0, 3.33} and values[0] == pytest.approx(10 ** round(math.log10(values[0])))
     counts = AXES["particles_per_cell"].values
-    assert counts[0] == 1 and counts[-1] == 27 and [b / a for a, b in pairwise(counts[:4])] == [2.0] * 3
+    assert counts[0] == 1 and counts[-1] == 27 and [b / a for a, b in itertools.pairwise(counts[:4])] == [2.0] * 3
     assert AXES["spacing"].values == pytest.approx((1 / 3, 1 / 2, 1, 2, 8 / 3))
     assert AXES["poisson_ratio"].values == (0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499)
 

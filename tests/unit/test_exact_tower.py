@@ -148,7 +148,7 @@ def test_a_ring_has_a_radius_and_a_drift():
     """Four points 3 mm outside and, of a third of the mass, 1 mm inside, moved by (3, 4) mm: the drift is 5 mm."""
     turn = np.arange(400) * 2 * np.pi / 400
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    flat = [*np.concatenate([0.053 * circle, 0.049 * circle]), 0.1, -0.2]
+    flat = np.concatenate([0.053 * circle, 0.049 * circle]) + np.array([0.1, -0.2])
     mass = np.repeat([3.0, 1.0], 400)
     still = measure_tower(frame(np.column_stack([flat, np.zeros(800)]), 0.5, mass), RING)
     assert still["layer_1_radius_m"] == pytest.approx(0.052) and still["layer_1_drift_m"] == pytest.approx(
