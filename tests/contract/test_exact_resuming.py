@@ -132,7 +132,29 @@ def test_a_run_leaves_its_record_series_and_frames(tmp_path):
         1
     ] == pytest.approx(mass)
     assert set(record["bounds_s"]) == {"acoustic", "advective"} and record["launches"]["process_per_tick"] == 0
+    assert 0 < record["cost"]["total_s"] < 60 and 0 < record["cost"]["wall_s"] < record["cost"]["total_s"]
     assert sum(record["binding_s"].values()) == pytest.approx(0.05) and record["input"] == s.model_dump(mode="json")
+
+
+def test_launches_of_processes_are_told_by_tick(tmp_path):
+    """Growth: births and their number, in every tick and once more before the first look."""
+    foam = {"density": 100.0, "youngs_modulus": 2e3, "yield_stress": 20.0, "expansion": {"ratio": 2.0, "time": 0.1}}
+    s = scenario(duration=0.04, tick=0.01, output_interval=0.02, spacing=0.02, material=foam)
+    perform(Job(s.model_dump(mode="json"), "mpm"), tmp_path, lambda _: None)
+    record, _ = read_record(tmp_path)
+    sim = Simulation(s, "mpm")
+    for _ in range(4):
+        sim.advance()
+    assert record["launches"]["process_per_tick"] == sim.process_launches.count / 4 > 1
+    assert "volume_growth" in record["measures"]
+
+
+def test_a_run_that_breaks_has_no_measures(tmp_path, monkeypatch):
+    monkeypatch.setattr("fluidbench.health.Health.broken", lambda self: "it broke")
+    s = scenario(duration=0.02, tick=0.01, output_interval=0.02, spacing=0.02)
+    perform(Job(s.model_dump(mode="json"), "mpm"), tmp_path, lambda _: None)
+    record, _ = read_record(tmp_path)
+    assert (record["verdict"], record["measures"], record["answers"]) == ("diverged", {}, [])
 
 
 def test_an_estimate_by_hand():

@@ -1,13 +1,26 @@
 """Cells of the tables as they are formatted, and of the page of the printed tower."""
 
 import math
+from io import StringIO
 
 import pytest
+from rich.console import Console
 
 from fluidbench.report import stability as stability_page
 from fluidbench.report import table1 as table1_page
 from fluidbench.report import table2 as table2_page
-from fluidbench.report.tables import against_reference, backends, costs, fidelity, label, number, spread, successes
+from fluidbench.report.tables import (
+    Table,
+    against_reference,
+    backends,
+    costs,
+    fidelity,
+    label,
+    number,
+    show,
+    spread,
+    successes,
+)
 from fluidbench.study.table2 import Row
 
 from .made import case, evidence, finished, known, repeated, trial
@@ -134,6 +147,26 @@ def test_backends_are_compared_where_there_are_two():
     assert backends(pair()[:2]) is None and backends([*pair()[:2], finished(verdict="error", backend="taichi")]) is None
 
 
+def test_a_table_is_printed_with_all_its_cells_and_its_note():
+    wide, narrow = Console(width=120, record=True, file=StringIO()), Console(width=60, file=StringIO())
+    table = Table("Title", ["", "head [s]"], [["row", "1.5"], ["another", "[x]"]], "a note with [brackets]")
+    for console in (wide, narrow):
+        show(console, table)
+    text = wide.export_text()
+    for words in ("Title", "head [s]", "row", "1.5", "[x]", "a note with [brackets]"):
+        assert words in text
+    (line,) = [line for line in text.splitlines() if "another" in line]
+    assert line.index("another") < line.index("[x]") and "another " in line and "[x] │" in line  # left, and right
+    bare = Console(width=120, record=True, file=StringIO())
+    show(bare, Table("T", ["a"], [["b"]]))
+    assert bare.export_text().rstrip().endswith("┘")
+    long = Table("T", ["", "x"], [["n" * 70, "1"]])
+    for width, folded in ((120, False), (99, False), (60, True)):
+        console = Console(width=width, record=True, file=StringIO())
+        show(console, long)
+        assert ("n" * 70 not in console.export_text()) is folded
+
+
 # --- pages of studies
 
 
@@ -163,6 +196,7 @@ def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
     assert (first["steps_per_s"], first["steps_per_s_pictures"], first["simulated_to_real"]) == (100.0, 40.0, 0.1)
     assert (first["repeats"], first["bytes"], first["launches_per_substep"], second["repeats"]) == (2, 42, 4, 0)
     assert made.machine == "cores 2" and [len(v) for v in made.runs.values()] == [4, 2]
+    assert [row[:2] for row in made.tables[1].rows] == [["mpm", "cost insensitive to the pool's size"]]
     assert made.findings[0].startswith("mpm: 'cost insensitive to the pool's size': not decidable")
 
 
