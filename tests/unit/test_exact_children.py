@@ -1,5 +1,6 @@
 """What a child leaves, what it cost, what a run needs and what it was made by."""
 
+import hashlib
 import math
 import os
 import sys
@@ -196,3 +197,45 @@ def test_what_a_run_was_made_by():
     about = provenance.machine(Target(backend="taichi"))
     assert about["backend_version"] == provenance.code("mpm", "taichi")["taichi"] and found.items() <= about.items()
     assert math.isfinite(float(about["load"])) and len(provenance.code("mpm", "warp")["sources"]) == 16
+
+
+def test_processors_and_devices_have_names(tmp_path, monkeypatch):
+    listing = tmp_path / "cpuinfo"
+    listing.write_text("processor : 0\nmodel name : Fast One\n\nprocessor : 1\nmodel name : Fast Two\n")
+    monkeypatch.setattr(provenance, "Path", lambda _: listing)
+    assert provenance.processor.__wrapped__() == "Fast One"
+    monkeypatch.setattr(provenance.platform, "processor", lambda: "plain")
+    listing.write_text("processor : 0\n")
+    assert provenance.processor.__wrapped__() == "plain"
+    listing.unlink()
+    assert provenance.processor.__wrapped__() == "plain"
+    found = provenance.hardware(Target("cuda:0"), SimpleNamespace(arch=90, name="GPU"))
+    assert (found["arch"], found["device"]) == ("sm_90", "GPU")
+
+
+def test_every_source_counts_by_its_place_and_content(tmp_path, monkeypatch):
+    for name in ("fluidbench", "other"):
+        (tmp_path / name / "cli").mkdir(parents=True)
+    (tmp_path / "single.py").write_text("x = 1")
+
+    def spec(name):
+        alone = name == "single"
+        return SimpleNamespace(
+            origin=str(tmp_path / "single.py"), submodule_search_locations=None if alone else [str(tmp_path / name)]
+        )
+
+    monkeypatch.setattr(provenance, "find_spec", spec)
+    seen = [provenance._hash_of(("fluidbench", "other", "single"))]
+
+    def changed(path, text):
+        (tmp_path / path).write_text(text)
+        seen.append(provenance._hash_of(("fluidbench", "other", "single")))
+        return len(set(seen)) == len(seen)
+
+    assert changed("fluidbench/a.py", "1") and changed("other/cli/b.py", "2") and changed("single.py", "x = 2")
+    assert not changed("fluidbench/cli/c.py", "3")  # no run enters the command line
+    seen.pop()
+    (tmp_path / "fluidbench" / "a.py").rename(tmp_path / "fluidbench" / "d.py")
+    assert provenance._hash_of(("fluidbench", "other", "single")) not in seen
+    expected = hashlib.sha256(b"single/single.py\0x = 2\0").hexdigest()[:16]
+    assert provenance._hash_of(("single",)) == expected

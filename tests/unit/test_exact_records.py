@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import threading
 from pathlib import Path
 
 import pytest
@@ -241,6 +242,43 @@ def test_runs_are_made_once_and_an_interruption_counts_what_is_done(tmp_path, mo
     if workers == 1:
         with pytest.raises(Interrupted, match=r"^1 of 2 runs are finished"):
             execute([Job(TABLE, "mpm", repeat=r) for r in (0, 2)], Store(tmp_path), nothing)
+
+
+def test_runs_of_one_worker_are_made_one_by_one_and_each_once(tmp_path, monkeypatch):
+    threads, stopped = [], []
+
+    def launch(job, folder, progress):
+        threads.append(threading.current_thread())
+        if job.repeat == 9:
+            raise KeyboardInterrupt
+        return write_record(folder, job.heading() | {"verdict": "timeout", "files": {}})
+
+    monkeypatch.setattr(execution, "launch", launch)
+    monkeypatch.setattr(execution, "stop_children", lambda: stopped.append(1))
+    nothing = Hooks(*[lambda *_: None] * 3, lambda _: None)
+    execute([Job(TABLE, "mpm")], Store(tmp_path), nothing)
+    assert threads == [threading.main_thread()]
+    execute([Job(TABLE, "mpm", repeat=1)], Store(tmp_path), nothing, 2)
+    assert threads[1] != threading.main_thread() and not stopped
+    with pytest.raises(Interrupted):
+        execute([Job(TABLE, "mpm", repeat=9)], Store(tmp_path), nothing, 2)
+    assert stopped == [1]
+
+
+def test_a_fresh_store_makes_each_run_once(tmp_path, monkeypatch):
+    made = []
+
+    def launch(job, folder, progress):
+        made.append(job)
+        machine = execution.hardware(job.target)
+        return write_record(folder, job.heading() | {"verdict": "completed", "machine": machine, "film_every": None,
+                                                     "code": execution.code("mpm", "warp"), "files": {}})  # fmt: skip
+
+    monkeypatch.setattr(execution, "launch", launch)
+    nothing = Hooks(*[lambda *_: None] * 3, lambda _: None)
+    store = Store(tmp_path, fresh=True)
+    results = execute([Job(TABLE, "mpm")] * 3, store, nothing)
+    assert len(made) == 1 and [r.reused for r in results] == [False] * 3 and store.made == {results[0].folder}
 
 
 def test_a_run_in_words():
