@@ -51,6 +51,21 @@ def test_a_checkpoint_is_due_after_its_interval(tmp_path, monkeypatch):
     assert not kept(tmp_path, falling(), every=0.0).due()
 
 
+def test_a_checkpoint_is_written_after_every_tick_that_is_due(tmp_path, monkeypatch):
+    written = []
+    sim = falling(Stepping)
+    points = kept(tmp_path, sim)
+    monkeypatch.setattr(points, "due", lambda: sim.done % 3 == 0)
+    monkeypatch.setattr(points, "write", lambda outcome: written.append((sim.done, outcome.substeps)))
+    sim.run(checkpoints=points)
+    assert written == [(3, 9), (6, 18)]
+    broken = falling(Stepping)
+    broken.pool.fault.fill_(1024)
+    points.simulation, written[:] = broken, []
+    monkeypatch.setattr(points, "due", lambda: True)
+    assert broken.run(checkpoints=points).verdict is Verdict.DIVERGED and written == []
+
+
 def test_a_run_goes_on_as_if_nothing_had_happened(tmp_path):
     whole = falling(Stepping)
     expected = whole.run()

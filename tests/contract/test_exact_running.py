@@ -1,5 +1,6 @@
 """The loop by hand, with the smallest method there is: ticks, outputs, bounds, verdicts, limits of time, resumption."""
 
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
@@ -40,6 +41,15 @@ def test_outputs_come_at_their_ticks_and_the_first_before_all():
     assert outcome.substeps == 24 and outcome.particle_substeps == 24 * 8 and outcome.peak_particles == 8
     assert outcome.binding == {"told": 1.0} and outcome.wall > 0 and outcome.cpu >= 0 and outcome.prepare_wall >= 0
     assert sim.substep_launches.count == 1 and (sim.tick, sim.ticks, sim.ticks_per_output) == (0.125, 8, 2)
+
+
+def test_clocks_run_only_while_the_loop_does(monkeypatch):
+    """Clocks that go on by 1 and by 0.5 at every look: twice in preparing, and twice a tick."""
+    wall, cpu = itertools.count(), itertools.count()
+    clocks = SimpleNamespace(perf_counter=lambda: 1.0 * next(wall), process_time=lambda: 0.5 * next(cpu))
+    monkeypatch.setattr(simulation, "time", clocks)
+    outcome = falling(Stepping).run(lambda *_: next(wall))
+    assert (outcome.prepare_wall, outcome.wall, outcome.cpu) == (1.0, 8.0, 4.0)
 
 
 def test_the_last_tick_is_an_output_even_between_two():
@@ -163,6 +173,9 @@ def test_what_breaks_ends_the_run_with_its_time_and_its_reason():
     late.film = SimpleNamespace(due=lambda now: now > 0.9, shoot=lambda s: s.pool.fault.fill_(1024))
     outcome = late.run()  # broken after the last look, and found all the same
     assert outcome.verdict is Verdict.DIVERGED and outcome.reason.startswith("at t = 1 s a particle was thrown")
+    last = falling(Full)
+    last.film = SimpleNamespace(due=lambda now: now > 0.9, shoot=lambda s: s.pool.volume.fill_(float("nan")))
+    assert last.run().verdict is Verdict.DIVERGED
     small = falling()
     small.emission = SimpleNamespace(advance=lambda now, tick: small.pool.need(0, 99))
     outcome = small.run()
