@@ -73,6 +73,24 @@ def test_a_block_on_a_rough_face_slows_down_by_coulombs_law(method, top):
     assert early - late == pytest.approx(3.0 * (now - then), rel=0.1)
 
 
+@pytest.mark.parametrize("top", [False, True])
+@pytest.mark.parametrize("friction", [0.1, 0.3])
+def test_a_sheet_of_pbd_on_a_rough_face_slows_down_by_coulombs_law(friction, top):
+    """A single layer, whose particles carry nothing but themselves."""
+    faces = ({"friction": 0.9}, {"friction": friction})
+    walls = dict(zip(("z_lower", "z_upper"), faces if top else faces[::-1], strict=True))
+    speeds = []
+    for duration in (0.1, 0.2):
+        z = 0.195 if top else 0.005
+        body = {"kind": "box", "center": [0.16, 0.1, z], "size": [0.08, 0.08, 0.01], "velocity": [0.9, 0, 0]}
+        s = scenario(domain={"lower": [0, 0, 0], "upper": [0.4, 0.2, 0.2], "walls": walls}, bodies=[body],
+                     gravity=[0, 0, 10.0 if top else -10.0], material=SOLID, duration=duration)  # fmt: skip
+        sim = Simulation(s, "pbd")
+        assert sim.run().verdict is Verdict.COMPLETED
+        speeds.append(float(sim.frame()["velocity"][:, 0].mean()))
+    assert speeds[0] - speeds[1] == pytest.approx(10.0 * friction * 0.1, rel=0.01)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_viscous_block_on_a_sticking_face_is_held(method):
     syrup = {"density": 1000.0, "viscosity": 100.0, "sound_speed": 4.0}
@@ -104,21 +122,13 @@ def test_overlap_seen_on_the_grid_of_mpm_relaxes_at_its_rate():
 @pytest.mark.parametrize(
     ("method", "field", "value"),
     [
-        ("mpm", "volume_ratio", 1e7),
-        ("mpm", "volume_ratio", 1e-7),
-        ("mpm", "elastic_normal", -5.0),
-        ("mpm", "affine", -1e6),
-        ("sph", "density", 1e8),
-        ("sph", "density", -5e3),
-        ("sph", "elastic_normal", -5.0),
-        ("pbd", "elastic_normal", -5.0),
-        ("mpm", "elastic_normal", 1e7),
-        ("sph", "elastic_normal", 1e7),
-        ("pbd", "elastic_normal", 1e7),
+        *[("mpm", "volume_ratio", value) for value in (1e7, 1e-7, -1.0)],
+        *[("sph", "density", value) for value in (1e8, -5e3)],
+        *[(method, "elastic_normal", value) for method in METHODS for value in (-5.0, 1e7)],
     ],
 )
-def test_a_state_that_no_matter_has_is_marked_by_the_pass_that_advances_it(method, field, value):
-    """Between two substeps, where no audit looks."""
+def test_a_state_that_no_matter_has_is_found_after_the_substep_that_meets_it(method, field, value):
+    """Broken between two substeps: the pass that advances it, or the audit that follows, marks it."""
     sim = Simulation(scenario(material=PASTE, spacing=0.016), method, graphs=False)
     sim.prepare()
     sim.advance()
@@ -126,6 +136,20 @@ def test_a_state_that_no_matter_has_is_marked_by_the_pass_that_advances_it(metho
     values = sim.pool.fields[field].numpy().copy()
     values[5] = value
     sim.pool.fields[field].assign(values)
+    sim._run(1)
+    sim.health.audit()
+    assert sim.health.broken() is not None
+
+
+@pytest.mark.parametrize("density", [1.1e6, -1.1e3])
+def test_sph_marks_densities_before_it_mends_them(density):
+    """It keeps a density above a tenth of that at rest, which would hide what is broken from any audit."""
+    sim = Simulation(scenario(material=PASTE, spacing=0.016), "sph", graphs=False)
+    sim.prepare()
+    sim.advance()
+    values = sim.pool.density.numpy().copy()
+    values[5] = density
+    sim.pool.density.assign(values)
     sim._run(1)
     assert int(sim.pool.fault.numpy()[0]) & int(FAULT_STATE)
 
