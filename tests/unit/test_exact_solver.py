@@ -60,6 +60,7 @@ def test_copies_forget_what_was_derived():
     assert s.reference_speed == s.model_copy().reference_speed
     faster = s.model_copy(update={"gravity": (0.0, 0.0, -4 * 9.81)})
     assert faster.reference_speed == pytest.approx(2 * s.reference_speed)
+    assert s.replace(spacing=0.02).spacing == 0.02 and s.spacing == 0.01
     numbers = Numbers()
     assert numbers.replace(some=2.0) == Numbers(some=2.0) and numbers.some == 0.0
     with pytest.raises(ValidationError):
