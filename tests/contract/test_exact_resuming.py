@@ -123,6 +123,9 @@ def test_the_film_goes_on_with_its_next_picture(tmp_path):
     other.film = SimpleNamespace(shots=0, next=0.0)
     assert kept(tmp_path, other).restore(Outcome(Verdict.COMPLETED))
     assert (other.film.shots, other.film.next) == (3, 0.7)
+    kept(tmp_path, falling()).write(Outcome(Verdict.COMPLETED))  # by a run without pictures
+    other.film.shots = 5
+    assert kept(tmp_path, other).restore(Outcome(Verdict.COMPLETED)) and other.film.shots == 5
 
 
 # --- a run's own process

@@ -205,6 +205,8 @@ def test_a_ring_keeps_its_radius_to_a_tenth(radius, met):
     assert criterion["measured"] == pytest.approx(abs(radius / 0.05 - 1))
     assert verdict is (Print.SOUND if met else Print.DEFORMED)
     assert "worst radius error" not in judged()[1]
+    none = judged(RING, **{f"layer_{k}_level_m": None for k in (1, 2, 3)})[1]["worst radius error"]
+    assert (none["measured"], none["met"]) == (1.0, False)
 
 
 def test_verdicts_are_ordered_from_the_worst():

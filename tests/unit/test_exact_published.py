@@ -103,6 +103,7 @@ def test_a_validation_writes_everything_and_tells_notes(tmp_path):
     rows = known()
     for run in (run for t in rows for run in t.runs.values()):
         object.__setattr__(run, "folder", tmp_path / "runs" / "x")
+    rows[0].finding = Finding(0.1, (Number("height of the drop", 1.0, 2.0),))
     assert page.present(rows, tmp_path, quiet) is False
     written = {path.name for path in tmp_path.iterdir()}
     assert {"validate.parquet", "validate.json", "validate.md", "known_answers.csv", "report.html"} <= written
@@ -110,6 +111,7 @@ def test_a_validation_writes_everything_and_tells_notes(tmp_path):
         "drop mpm: MISS: a|b", "drop sph: timeout: slow", f"report: {tmp_path / 'report.html'}"
     ]  # fmt: skip
     html = (tmp_path / "report.html").read_text()
+    assert html.index('<h2 id="drop"') < html.index("height of the drop") < html.index('<h2 id="law"')
     assert html.count("<h2 id=") == 2 and "error against cost" in html
     assert len(list(tmp_path.glob("*work_precision.png"))) == 1  # of the case, not of the law
 

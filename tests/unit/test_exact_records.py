@@ -149,6 +149,8 @@ def test_a_claim_is_waited_for_and_sweeps_what_the_dead_left(tmp_path, monkeypat
     (folder / ".record.json.1.part").write_text("torn")
     with store.claimed(folder, notes.append):
         assert not list(folder.glob(".*.part")) and (folder / "claim.lock").exists()
+    with store.claimed(folder, notes.append):  # it was given back
+        pass
     assert notes == [] and store.PATIENCE == 5.0
     monkeypatch.setattr(store, "PATIENCE", 0.05)
     with SoftFileLock(folder / "claim.lock") as held, pytest.raises(RuntimeError, match="asked"):

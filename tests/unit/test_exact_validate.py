@@ -3,8 +3,10 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from fluidbench.store import write_parquet
 from fluidbench.study import validate as module
 from fluidbench.study.case import Finding, Run, cases, select
 from fluidbench.study.validate import LEVELS, Trial, evaluate, evaluate_law, orders, plan, tidy
@@ -133,6 +135,8 @@ def test_a_run_shows_its_frames_in_order_of_time(tmp_path):
     assert run.times.tolist() == [0.0, 0.5, 2.0] and run.dt == 0.25 and run.method == "mpm"
     assert [int(run.near(t)["mass"][0]) for t in (0.2, 0.3, 1.2, 1.3, 9.0, -1.0)] == [0, 1, 1, 2, 2, 0]
     assert run.scenario == scenario()
+    write_parquet(tmp_path / "series.parquet", pd.DataFrame({"time_s": [0.0, 0.5], "top_m": [3.0, 2.0]}))
+    assert run.series["top_m"].tolist() == [3.0, 2.0]
 
 
 def test_cases_are_chosen_by_name_in_order_of_physics():
