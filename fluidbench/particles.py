@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 
 from .errors import UserError
-from .scenario import ADDRESSABLE
+from .extent import ADDRESSABLE
 from .scene import Scene
 
 wp.set_module_options({"enable_backward": False})

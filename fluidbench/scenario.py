@@ -14,13 +14,11 @@ from pydantic import Field, field_validator, model_validator
 from .body import CORNERS, Body
 from .collider import Collider
 from .errors import quoted
+from .extent import check_size, check_time
 from .material import Material
-from .model import LEAST, Matrix, Model, NonNegative, Positive, Vector
+from .model import Matrix, Model, NonNegative, Positive, Vector
 from .toolpath import Toolpath, Track
 
-ADDRESSABLE = 2**26  # particles: neighbour lists keep 26 bits for an index
-RESOLVED = 2**18  # spacings from the origin at which single precision still resolves a 64th of a spacing
-MOST_TICKS, MOST_OUTPUTS = 10**8, 10**6
 LONGEST_NAME = 80
 AGES = 65  # ages at which bounds look at a material that changes
 FACES = ("x_lower", "x_upper", "y_lower", "y_upper", "z_lower", "z_upper")
@@ -161,8 +159,8 @@ class Scenario(Model):
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
         for check in (
-            self._check_source, self._check_size, self._check_time, self._check_nozzle, self._check_bodies,
-            self._check_periodic, self._check_force, self._check_collider,
+            self._check_source, self._check_extent, self._check_nozzle, self._check_bodies, self._check_periodic,
+            self._check_force, self._check_collider,
         ):  # fmt: skip
             check()
         return self
@@ -173,49 +171,9 @@ class Scenario(Model):
         if self.nozzle is None and not self.bodies:
             raise ValueError("nothing to simulate: give bodies, or a nozzle with a toolpath")
 
-    def _check_size(self) -> None:
-        """Enough room in memory and in single precision, before anything is laid out."""
-        d, domain = self.spacing, self.domain
-        boxes = [math.prod(2.0 * float(edge) / d + 1.0 for edge in body.extent) for body in self.bodies]
-        stream = 0.0
-        if self.nozzle is not None:
-            stream = self.nozzle.rate * self.duration / d**3 + (self.nozzle.diameter / d + 5.0) ** 2
-        expansion = self.material.expansion
-        most = (sum(boxes) + stream) * (1.0 if expansion is None else 2.0 * expansion.ratio)
-        if self.pool is not None and self.pool > ADDRESSABLE:
-            raise ValueError(f"pool = {float(self.pool):.6g}: {_too_many(self.pool)}")
-        if most > 8.0 * ADDRESSABLE:  # bodies may fill little of their boxes; the exact count is judged later
-            raise ValueError(f"spacing = {d:g} m: bodies and nozzle would be {_too_many(most)}")
-        far = max(map(abs, (*domain.lower, *domain.upper)))
-        if far > RESOLVED * d:
-            cells = math.prod((high - low) / d for low, high in zip(domain.lower, domain.upper, strict=True))
-            raise ValueError(
-                f"domain: it reaches to {far:.6g} m, {far / d:.3g} spacings, and holds as much as {_too_many(cells)}; "
-                f"single precision resolves positions up to {RESOLVED} spacings ({RESOLVED * d:.3g} m): use a larger "
-                "spacing or a smaller domain"
-            )
-        if 0 < abs(self.material.poisson_ratio) < LEAST:
-            raise ValueError(f"material.poisson_ratio = {self.material.poisson_ratio:g} is beyond any physics; give 0")
-
-    def _check_time(self) -> None:
-        """A number of ticks and outputs that a computer comes to the end of."""
-        outputs = self.duration / min(self.output_interval or self.duration / 20.0, self.duration)
-        if outputs > MOST_OUTPUTS:
-            raise ValueError(
-                f"output_interval = {self.output_interval:g} s makes {outputs:.3g} outputs of {self.duration:g} s; at "
-                f"most {MOST_OUTPUTS} are measured and kept"
-            )
-        ticks = self.duration / (self.tick or 0.25 * self.spacing / self.reference_speed)
-        if ticks > MOST_TICKS:
-            key = (
-                f"tick = {self.tick:g} s"
-                if self.tick
-                else f"spacing = {self.spacing:g} m, {self.reference_speed:.3g} m/s"
-            )
-            raise ValueError(
-                f"duration = {self.duration:g} s at {key} makes {ticks:.3g} ticks of a substep or more; at most "
-                f"{MOST_TICKS} end in a day"
-            )
+    def _check_extent(self) -> None:
+        check_size(self)
+        check_time(self)
 
     def _check_nozzle(self) -> None:
         if self.nozzle is None or self.track is None:
@@ -392,14 +350,3 @@ class Scenario(Model):
                 f"({self.reference_speed:.3g} m/s): expect visible compression"
             )
         return out
-
-
-def _too_many(particles: float) -> str:
-    """What a number of particles would take, and what there is."""
-    import psutil
-
-    there, particles = psutil.virtual_memory().available / 2**30, float(particles)
-    return (
-        f"{particles:.3g} particles, at some 300 bytes each {300 * particles / 2**30:.3g} GiB at least; "
-        f"{ADDRESSABLE} can be addressed, and this machine has {there:.3g} GiB left"
-    )

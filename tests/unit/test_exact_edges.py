@@ -10,9 +10,9 @@ from fluidbench import library
 from fluidbench.body import Body
 from fluidbench.cure import Cure
 from fluidbench.errors import UserError
+from fluidbench.extent import ADDRESSABLE, RESOLVED
 from fluidbench.model import check_number
 from fluidbench.particles import Pool
-from fluidbench.scenario import ADDRESSABLE, RESOLVED
 from fluidbench.scene import Scene
 
 from ..conftest import bead, scenario

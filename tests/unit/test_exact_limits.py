@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.scenario import ADDRESSABLE, MOST_OUTPUTS, MOST_TICKS, RESOLVED
+from fluidbench.extent import ADDRESSABLE, MOST_OUTPUTS, MOST_TICKS, RESOLVED
 
 from ..conftest import bead, scenario
 

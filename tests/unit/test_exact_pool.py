@@ -5,8 +5,8 @@ import pytest
 import warp as wp
 
 from fluidbench.errors import UserError
+from fluidbench.extent import ADDRESSABLE
 from fluidbench.particles import CORE, FREE, MOST, OutOfCapacity, Pool, whole_warps
-from fluidbench.scenario import ADDRESSABLE
 from fluidbench.scene import (
     Scene,
 )
