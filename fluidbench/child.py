@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from .checkpoint import Checkpoints
+from .job import Job
 from .provenance import code, machine
-from .run import Job
 from .scenario import Scenario
 from .store import write_atomically, write_parquet, write_record
 

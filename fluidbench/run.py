@@ -11,54 +11,21 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from .errors import Interrupted, Obstacle, UserError
+from .job import Job
 from .offspring import command, end_with_parent, environment
-from .store import key_of, make_way, write_atomically, write_record
-from .target import HERE, Target
+from .store import make_way, write_atomically, write_record
+from .target import Target
 
 PROGRESS, OBSTACLE = "@progress ", "@obstacle "
 ATTENDED = "--attended"  # to a child: end when standard input closes, which then is the parent's end
 GRACE = 120.0  # seconds beyond the wall limit for compiling, measuring and writing
-CHECKPOINTS = 300.0  # wall seconds between checkpoints
 _children: set[subprocess.Popen] = set()  # that run now, on whatever thread
 OOM_COUNTERS = (Path("/sys/fs/cgroup/memory.events"), Path("/sys/fs/cgroup/memory/memory.oom_control"))
-
-
-@dataclass(frozen=True)
-class Job:
-    """One run: what it is (scenario, method, target, repeat, variant), and how it is watched."""
-
-    scenario: dict[str, Any]
-    method: str
-    target: Target = HERE
-    repeat: int = 0
-    variant: str = ""  # sets runs apart that differ in how they are watched, where that is measured
-    wall_limit: float | None = None
-    keep_frames: bool = False
-    film_every: float | None = None
-    checkpoint_every: float = field(default=CHECKPOINTS)  # wall seconds; 0 for none
-
-    def inputs(self) -> dict[str, Any]:
-        """What a run is; how long it may take, and whether it is filmed, is not."""
-        return {
-            "scenario": self.scenario, "method": self.method, "target": asdict(self.target), "repeat": self.repeat,
-            **({"variant": self.variant} if self.variant else {}),
-        }  # fmt: skip
-
-    @property
-    def key(self) -> str:
-        return key_of(self.inputs())
-
-    def heading(self) -> dict[str, Any]:
-        """How every record of this job begins, whatever became of it."""
-        return {
-            "scenario": self.scenario["name"], "method": self.method, **asdict(self.target), "repeat": self.repeat,
-            "key": self.key, "seed": self.scenario["seed"], "spacing_m": self.scenario["spacing"],
-        }  # fmt: skip
 
 
 def launch(job: Job, folder: Path, progress: Callable[[dict[str, Any]], None] | None = None) -> dict[str, Any]:

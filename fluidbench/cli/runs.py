@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..job import CHECKPOINTS
 from .app import (
     Backend,
     Checkpoint,
@@ -55,7 +56,7 @@ def compare(
     quick: Quick = False,
     render_every: Film = None,
     fresh: Fresh = False,
-    checkpoint_every: Checkpoint = 300.0,
+    checkpoint_every: Checkpoint = CHECKPOINTS,
 ) -> None:
     """Run one scenario through several methods and put fidelity and cost side by side.
 
@@ -82,7 +83,7 @@ def run(
     quick: Quick = False,
     render_every: Film = None,
     fresh: Fresh = False,
-    checkpoint_every: Checkpoint = 300.0,
+    checkpoint_every: Checkpoint = CHECKPOINTS,
 ) -> None:
     """Run one scenario through one method."""
     from ..solver import get_solver

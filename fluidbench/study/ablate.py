@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import UserError
-from ..run import Job
+from ..job import Job
 from ..scenario import Friction, Scenario
 from ..solver import configure, get_solver
 from ..store import Store

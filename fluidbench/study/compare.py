@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..run import Job
+from ..job import Job
 from ..scenario import Scenario
 from ..solver import check_backend, configure, get_solver
 from ..target import Target

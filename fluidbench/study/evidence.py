@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..job import Job
 from ..measure.reference import table as reference
-from ..run import Job
 from ..scenario import Scenario
 from ..solver import configure, get_solver
 from ..store import Store

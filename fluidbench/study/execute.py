@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Interrupted
+from ..job import Job
 from ..needs import shortage
 from ..provenance import HARDWARE, code, hardware
-from ..run import Job, launch, stop_children
+from ..run import launch, stop_children
 from ..scenario import Scenario
 from ..solver import configure, get_solver, refusal
 from ..store import Store, claimed, write_record

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from ..job import Job
 from ..measure.reference import table as reference
-from ..run import Job
 from ..scenario import Scenario
 from ..store import Store
 from ..target import Target

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import mean, stdev
 
+from ..job import Job
 from ..layout import capacity_of
 from ..library import load
-from ..run import Job
 from ..store import Store
 from ..target import Target
 from ..verdict import lacking

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import UserError, suggestion
-from ..run import Job
+from ..job import Job
 from ..scenario import Scenario
 from ..solver import configure, get_solver
 from ..store import Store, write_atomically, write_parquet
