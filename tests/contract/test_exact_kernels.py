@@ -188,3 +188,21 @@ def test_pbd_leaves_what_is_not_crowded_alone(gap):
         sim.march(1e-3, 1)
         shift = np.abs(sim.pool.position.numpy()[:n] - start).max()
         assert bool(shift > 1e-5) is moves, scale
+
+
+@pytest.mark.parametrize("start", [1.06, 0.94, 1.02])
+def test_the_density_of_sph_follows_its_lattice_at_its_rate(start):
+    """d rho = dt f (c / h) (rho_lattice - rho), but for the tolerance, in a full period at rest."""
+    edge = 0.12
+    s = scenario(domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS}, gravity=[0, 0, 0], spacing=0.01,
+                 bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}],
+                 material={"density": 1000.0, "sound_speed": 4.0})  # fmt: skip
+    sim, dt = Simulation(s, "sph"), 1e-4
+    sim.pool.density.fill_(1000.0 * start)
+    sim.march(dt, 1)
+    gap = 1000.0 * (1.0 - start)
+    gap = np.sign(gap) * max(abs(gap) - sim.config.density_tolerance * 1000.0 * start, 0.0)
+    expected = dt * sim.config.density_feedback * 4.0 / (1.8 * 0.01) * gap
+    change = sim.pool.density.numpy()[: sim.pool.counts[0]] - np.float32(1000.0 * start)
+    assert change == pytest.approx(np.full(len(change), expected), rel=0.02, abs=2e-4)
+    assert bool(expected != 0.0) is (start != 1.02)
