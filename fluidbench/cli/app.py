@@ -73,7 +73,7 @@ def methods_of(solvers: str | None) -> list[str]:
 
 def positive(value: float, option: str, zero: bool = False) -> float:
     """The value; raises UserError unless it is finite and positive (or `zero`)."""
-    if not math.isfinite(value) or value < 0 or (value == 0 and not zero) or 0 < value < 1e-9:
+    if not math.isfinite(value) or value < 0 or (value == 0 and not zero) or 0 < value < 1e-9 or value > 1e9:
         raise UserError(f"{option} takes a {'number of 0 or more' if zero else 'positive number'}; got {value:g}")
     return value
 

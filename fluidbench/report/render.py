@@ -49,7 +49,7 @@ def load(folder: Path) -> tuple[Scenario, list[dict[str, np.ndarray]]]:
 def values_of(frame: dict[str, np.ndarray], scenario: Scenario, colour: str) -> np.ndarray:
     """What a particle is coloured by, shape (n,)."""
     if colour not in COLOURS:
-        raise UserError(f"no colour '{colour}'{suggestion(colour, COLOURS)}; there are {', '.join(COLOURS)}")
+        raise UserError(f"no colour {quoted(colour)}{suggestion(colour, COLOURS)}; there are {', '.join(COLOURS)}")
     if colour == "speed":
         return np.linalg.norm(frame["velocity"], axis=1)
     if colour == "height":

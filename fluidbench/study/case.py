@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UserError, suggestion
+from ..errors import UserError, quoted, suggestion
 from ..scenario import Scenario
 from .execute import Finished
 
@@ -144,7 +144,7 @@ def select(names: list[str]) -> list[Case]:
     known = cases()
     for name in names:
         if name not in known:
-            raise UserError(f"no case named '{name}'{suggestion(name, known)}")
+            raise UserError(f"no case named {quoted(name)}{suggestion(name, known)}")
     return [known[name] for name in names] if names else list(known.values())
 
 

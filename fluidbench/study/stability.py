@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UserError, suggestion
+from ..errors import UserError, quoted, suggestion
 from ..library import validate
 from ..measure.reference import table as reference
 from ..scenario import Scenario
@@ -69,7 +69,7 @@ def choose(names: Sequence[str]) -> dict[str, Axis]:
     """The axes named, or all; raises UserError with the nearest known name."""
     for name in names:
         if name not in AXES:
-            raise UserError(f"no axis '{name}'{suggestion(name, AXES)}")
+            raise UserError(f"no axis {quoted(name)}{suggestion(name, AXES)}")
     return {name: AXES[name] for name in names or AXES}
 
 

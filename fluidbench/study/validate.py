@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UserError, suggestion
+from ..errors import UserError, quoted, suggestion
 from ..job import Job
 from ..scenario import Scenario
 from ..solver import configure, get_solver
@@ -104,7 +104,7 @@ def plan(
 
 def _factor(level: str) -> float:
     if level not in LEVELS:
-        raise UserError(f"no level '{level}'{suggestion(level, LEVELS)}; there are {', '.join(LEVELS)}")
+        raise UserError(f"no level {quoted(level)}{suggestion(level, LEVELS)}; there are {', '.join(LEVELS)}")
     return LEVELS[level]
 
 
