@@ -42,6 +42,7 @@ def test_a_run_is_its_scenario_method_target_repeat_and_variant():
         Job(TABLE, "mpm", Target(backend="taichi", threads=2)),
     ]
     assert len({job.key for job in [first, *other]}) == 7
+    assert "variant" not in first.inputs() and other[2].inputs()["variant"] == "v"
     assert first.heading() == {
         "scenario": "line_bead", "method": "mpm", "device": "cpu", "backend": "warp", "threads": 1, "repeat": 0,
         "key": first.key, "seed": 0, "spacing_m": 1.5e-3,

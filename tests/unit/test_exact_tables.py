@@ -14,6 +14,7 @@ from fluidbench.report.tables import (
     against_reference,
     backends,
     costs,
+    failed_prints,
     fidelity,
     label,
     number,
@@ -104,6 +105,22 @@ def test_criteria_have_a_row_each():
     assert table.head == ["", "wanted", "mpm", "pbd"]
     assert table.rows == [["height", ">= 1", "0.5123 NO", "1 yes"], ["laid", ">= 1", "3 yes", "2 NO"]]
     assert successes([finished()]) is None
+
+
+def test_prints_that_failed_are_told_with_what_they_did_not_meet():
+    unmet = [{"name": "height", "measured": 0.51234, "wanted": ">= 1", "met": False},
+             {"name": "laid", "measured": 3, "wanted": "3", "met": True},
+             {"name": "radius", "measured": 0.25, "wanted": "<= 0.1", "met": False}]  # fmt: skip
+    runs = [
+        finished("mpm", print="collapsed", success=unmet),
+        finished("sph", print="sound", success=unmet),
+        finished("pbd"),
+        finished("pbd", "diverged", print="broken", success=unmet),
+    ]
+    (line,) = failed_prints(runs)
+    assert line.startswith("mpm") and line.endswith(
+        "collapsed: height 0.5123 (wanted >= 1); radius 0.25 (wanted <= 0.1)"
+    )
 
 
 COSTLY = {"substeps": 5, "particle_substeps_per_s": 1e4, "particle_substeps_per_cpu_s": 2e4, "peak_particles": 7,
