@@ -192,3 +192,31 @@ def test_an_estimate_by_hand():
     assert short.wall_s == pytest.approx(short.substeps * short.particles * 0.5 / 1e4)
     still = estimate(scenario(), Estimated)
     assert still.wall_s == pytest.approx(still.substeps * still.particles / 1e4)
+
+
+@pytest.mark.parametrize("stop", [4, 15])
+def test_a_print_goes_on_with_its_stream_and_its_layers(tmp_path, stop):
+    """Emission and laying take up where they were: the same particles, bit for bit."""
+    later = {"kind": "box", "center": [0.04, 0.01, 0.004], "size": [0.008] * 3, "start": 0.06}
+    s = bead(duration=0.1, tick=0.01, bodies=[later])
+    whole, first = Simulation(s, Stepping), Simulation(s, Stepping)
+    whole.run()
+    outcome = Outcome(Verdict.COMPLETED)
+    for _ in range(stop):
+        first._tick(outcome, 1, None, None)
+    kept(tmp_path, first).write(outcome)
+    second = Simulation(s, Stepping)
+    second.run(checkpoints=kept(tmp_path, second))
+    assert second.pool.counts == whole.pool.counts and second.done == whole.done == 20
+    for name, value in whole.frame().items():
+        assert np.array_equal(second.frame()[name], value), name
+
+
+def test_matter_cures_as_the_run_goes_on():
+    """A linear cure of a second, at the start of the last tick, which is at 0.45 s: level 45 of 100."""
+    cure = {"kind": "linear", "time": 1.0, "youngs_modulus": 2e4}
+    s = scenario(duration=0.5, tick=0.05, output_interval=0.5, gravity=[0, 0, 0], spacing=0.02,
+                 material={"density": 1000.0, "youngs_modulus": 1e4, "yield_stress": 9e3, "cure": cure})  # fmt: skip
+    sim = Simulation(s, "mpm")
+    sim.run()
+    assert set(sim.frame()["phase"]) == {45}

@@ -190,6 +190,9 @@ class Told(Stepping):
         self.told = []
         self.backend = SimpleNamespace(name="other", wait=lambda: self.told.append("wait"))
 
+    def prepare(self):
+        self.told.append("prepare")
+
     def refresh(self):
         self.told.append("refresh")
 
@@ -207,6 +210,12 @@ def test_a_method_is_told_once_of_what_changed_outside_a_substep():
     assert sim.solver.told == ["refresh", "refresh"]
     sim.go_on(sim.progress(), {name: array.numpy() for name, array in sim.arrays().items()})
     assert sim.solver.told[2:] == ["resume"]
+
+
+def test_a_method_is_prepared_and_refreshed_before_the_first_look():
+    sim, seen = falling(Told), []
+    sim.run(lambda s, _: seen.append(list(s.solver.told)))
+    assert seen[0] == ["prepare", "refresh"] and seen[-1] == seen[0]
 
 
 def test_launches_are_captured_or_waited_for():
