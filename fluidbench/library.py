@@ -142,7 +142,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
 def _short(error: Exception) -> str:
     """What an error says, on one line of bearable length."""
     text = " ".join(str(error).split())
-    return text if len(text) <= 200 else f"{text[:200]}..."
+    return text if len(text) <= 450 else f"{text[:450]}..."
 
 
 def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:

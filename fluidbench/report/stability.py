@@ -46,6 +46,9 @@ def _blocks(blocks: Sequence[Row]) -> Table:
         note="theory: Fourier analyses of validation H; stable: kinetic energy grows less than 100-fold in 500 steps",
     )
     for b in blocks:
+        if "dt_limit_s" not in b:
+            table.rows.append([b["kind"], b["method"], b["reason"], "-", "-", "-"])
+            continue
         table.rows.append([
             b["kind"], b["method"], _seconds(b, "dt_limit_s"), _seconds(b, "dt_theory_s"),
             number(b["dt_limit_s"] / b["dt_theory_s"]), number(b["dt_own_s"] / b["dt_limit_s"]),

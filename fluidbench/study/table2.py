@@ -64,8 +64,8 @@ def table2(
                 table = scenario.model_dump(mode="json")
                 groups = []
                 for every in (None, PICTURE):
-                    variant = "" if every is None else "pictures"
-                    jobs = [Job(table, method, target, r, variant, wall_limit, film_every=every)
+                    watched = "" if every is None else "pictures"
+                    jobs = [Job(table, method, target, r, watched, wall_limit, film_every=every)
                             for r in range(repeats)]  # fmt: skip
                     groups.append(execute(jobs, store, hooks))
                 rows.append(Row(variant, pool, method, *groups))

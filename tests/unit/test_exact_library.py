@@ -111,7 +111,7 @@ def test_mistakes_are_told_five_at_a_time():
         "here: 'domain' is missing",
         "here: unknown key 'wrong'; known: " + ", ".join(sorted(library.Scenario.model_fields)),
     ]
-    assert library._short("x" * 200) == "x" * 200 and library._short("x" * 201) == "x" * 200 + "..."
+    assert library._short("x" * 450) == "x" * 450 and library._short("x" * 451) == "x" * 450 + "..."
 
 
 def test_words_are_quoted_and_suggested():
