@@ -8,9 +8,10 @@ from typing import Any
 
 from .checkpoint import Checkpoints
 from .job import Job
-from .provenance import code, machine
+from .provenance import HARDWARE, machine
 from .scenario import Scenario
 from .store import write_atomically, write_parquet, write_record
+from .verdict import FINAL, Verdict
 
 
 def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
@@ -23,17 +24,18 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     from .measure.ledger import final_lengths, ledger, lengths
     from .measure.reference import answers
     from .measure.tower import is_tower, success, verdict_of
-    from .simulation import Simulation, Verdict
+    from .simulation import Simulation
     from .solver import approximations, get_solver
 
     scenario = Scenario.model_validate(job.scenario)
     solver = get_solver(job.method)
-    made_by, about = code(job.method, job.target.backend), machine(job.target)
+    heading, about = job.heading(), machine(job.target)
     start = time.perf_counter()
     simulation = Simulation(scenario, solver, job.target)
     rows: list[dict[str, float]] = []
     frames: list[Path] = []
-    checkpoints = Checkpoints(folder, job.checkpoint_every, {"key": job.key, "code": made_by}, simulation, rows)
+    identity = heading | {name: about[name] for name in HARDWARE} | job.watched()
+    checkpoints = Checkpoints(folder, job.checkpoint_every, identity, simulation, rows)
 
     def observe(sim: Simulation, vital: Any) -> None:
         frame = sim.frame()
@@ -60,7 +62,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     final = {**ledger(frame, scenario), **final_lengths(frame, scenario)} if complete else {}
     compared, not_compared = answers(scenario, series, final) if complete else ([], [])
     criteria = success(scenario, final, series) if complete and is_tower(scenario) else []
-    record = job.heading() | {
+    record = heading | {
         "verdict": str(outcome.verdict), "reason": outcome.reason,
         "measures": final,
         "answers": [asdict(a) for a in compared], "not_compared": not_compared,
@@ -76,10 +78,11 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         "approximations": approximations(solver, scenario, simulation.config),
         "warnings": scenario.warnings() + undrawn,
         "config": simulation.config.model_dump(), "input": scenario.model_dump(mode="json"),
-        "code": made_by, "machine": about, "film_every": job.film_every, "resumed": checkpoints.resumed,
+        "machine": about, "film_every": job.film_every, "resumed": checkpoints.resumed,
     }  # fmt: skip
     record = write_record(folder, record, [folder / "series.parquet", folder / "final.npz", *frames])
-    checkpoints.discard()
+    if outcome.verdict in FINAL:
+        checkpoints.discard()
     return record
 
 
@@ -124,12 +127,7 @@ def cost(outcome: Any, simulation: Any, total: float) -> dict[str, float]:
 
 def peak_memory() -> float:
     """Most memory that this process has held at once [bytes]."""
-    try:
-        import resource
-    except ImportError:  # Windows, where psutil knows it
-        import psutil
-
-        return float(psutil.Process().memory_info().peak_wset)  # type: ignore[attr-defined]
+    import resource
     import sys
 
     unit = 1 if sys.platform == "darwin" else 1024

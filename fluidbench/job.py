@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from .provenance import code
 from .store import key_of
 from .target import HERE, Target
 
@@ -34,9 +35,14 @@ class Job:
     def key(self) -> str:
         return key_of(self.inputs())
 
+    def watched(self) -> dict[str, Any]:
+        """What is to lie beside a run's results: a run that was watched otherwise has other files."""
+        return {"film_every": self.film_every, "keep_frames": self.keep_frames}
+
     def heading(self) -> dict[str, Any]:
-        """How every record of this job begins, whatever became of it."""
+        """How every record of this job begins, whatever became of it: what was asked for, and by which code."""
         return {
             "scenario": self.scenario["name"], "method": self.method, **asdict(self.target), "repeat": self.repeat,
             "key": self.key, "seed": self.scenario["seed"], "spacing_m": self.scenario["spacing"],
+            "code": code(self.method, self.target.backend),
         }  # fmt: skip

@@ -37,8 +37,8 @@ class Run:
     def frames(self) -> list[dict[str, np.ndarray]]:
         """Snapshots in order of time; `time` [s] is a 0-d array, see Simulation.frame for the rest."""
         found = []
-        for path in sorted(self.folder.glob("frame_*.npz")):
-            with np.load(path) as data:
+        for name in sorted(name for name in self.record["files"] if name.startswith("frame_")):
+            with np.load(self.folder / name) as data:
                 found.append({key: data[key] for key in data.files})
         return found
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..checkpoint import CHECKPOINT
 from ..errors import Interrupted
 from ..job import Job
 from ..needs import shortage
-from ..provenance import HARDWARE, code, hardware
+from ..provenance import HARDWARE, hardware
 from ..run import launch, stop_children
 from ..scenario import Scenario
 from ..solver import configure, get_solver, refusal
-from ..store import Store, claimed, write_record
+from ..store import Store, claimed, remove_quietly, write_record
 from ..target import Target
 from ..verdict import FINAL, Evidence, evidence_of
 
@@ -118,6 +119,8 @@ def _obtain(i: int, job: Job, store: Store, hooks: Hooks) -> Finished:
         hooks.started(i, job, record is not None)
         reused = record is not None and folder not in store.made
         if record is None:
+            if store.fresh:
+                remove_quietly(folder / CHECKPOINT)
             record = _refused(job, folder) or launch(job, folder, lambda state: hooks.progress(i, state))
             store.made.add(folder)
     return Finished(record, folder, reused)
@@ -130,7 +133,7 @@ def misfit(record: dict[str, Any], job: Job) -> str:
         return f"it ended as {record.get('verdict')}"
     if record.get("key") != job.key:
         return "it is of other inputs"
-    if record.get("code") != code(job.method, job.target.backend):
+    if record.get("code") != job.heading()["code"]:
         return "the code, or Warp or Taichi, has changed since"
     if record["verdict"] == "refused":
         return ""
@@ -151,5 +154,4 @@ def _refused(job: Job, folder: Path) -> dict[str, Any] | None:
     reason = refusal(solver, scenario, configure(solver, scenario)) or shortage(scenario, solver, job.target)
     if reason is None:
         return None
-    made_by = code(job.method, job.target.backend)
-    return write_record(folder, job.heading() | {"verdict": "refused", "reason": reason, "code": made_by})
+    return write_record(folder, job.heading() | {"verdict": "refused", "reason": reason})

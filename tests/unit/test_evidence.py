@@ -12,6 +12,7 @@ from fluidbench.report.select import _further
 from fluidbench.run import Job
 from fluidbench.store import Store, read_record, write_record
 from fluidbench.study import execute as execution
+import fluidbench.job as job_module
 from fluidbench.study import select as selection
 from fluidbench.study.case import Finding, cases
 from fluidbench.study.cells import figures
@@ -160,7 +161,6 @@ def stored(tmp_path, monkeypatch):
         for path in frames:
             path.write_bytes(b"frame")
         table = {"verdict": "completed", "reason": "", "measures": {"top_m": 1.0}, "film_every": job.film_every,
-                 "code": execution.code(job.method, job.target.backend),
                  "machine": execution.hardware(job.target) | {"time": "now"}}  # fmt: skip
         return write_record(folder, job.heading() | table, [folder / "final.npz", *frames])
 
@@ -197,13 +197,15 @@ def test_a_stored_run_is_reused_only_whole(stored):
 def test_a_stored_run_is_of_this_code_and_this_machine(stored, monkeypatch):
     _, call, notes = stored
     call()
-    for name, change, words in (("code", {"sources": "edited"}, "the code"), ("code", {"warp": "9.9"}, "the code"),
-                                ("hardware", {"processor": "another"}, "another machine")):  # fmt: skip
+    for place, name, change, words in (
+        (job_module, "code", {"sources": "edited"}, "the code"), (job_module, "code", {"warp": "9.9"}, "the code"),
+        (execution, "hardware", {"processor": "another"}, "another machine"),
+    ):  # fmt: skip
         real = getattr(provenance, name)
-        monkeypatch.setattr(execution, name, lambda *a, real=real, change=change: real(*a) | change)
+        monkeypatch.setattr(place, name, lambda *a, real=real, change=change: real(*a) | change)
         assert call()[1] == 1 and words in notes[-1]
         assert call()[1] == 0
-        monkeypatch.setattr(execution, name, real)
+        monkeypatch.setattr(place, name, real)
         assert call()[1] == 1 and call()[1] == 0
 
 

@@ -45,7 +45,7 @@ def test_a_run_is_its_scenario_method_target_repeat_and_variant():
     assert "variant" not in first.inputs() and other[2].inputs()["variant"] == "v"
     assert first.heading() == {
         "scenario": "line_bead", "method": "mpm", "device": "cpu", "backend": "warp", "threads": 1, "repeat": 0,
-        "key": first.key, "seed": 0, "spacing_m": 1.5e-3,
+        "key": first.key, "seed": 0, "spacing_m": 1.5e-3, "code": provenance.code("mpm", "warp"),
     }  # fmt: skip
     assert (first.target, first.checkpoint_every, first.wall_limit) == (HERE, 300.0, None) and GRACE == 120.0
 
@@ -174,7 +174,7 @@ def test_a_claim_is_waited_for_and_sweeps_what_the_dead_left(tmp_path, monkeypat
 @pytest.fixture
 def stored(monkeypatch):
     """A job, and a record that stands for it."""
-    monkeypatch.setattr(execution, "code", lambda method, backend: {"sources": f"{method} {backend}"})
+    monkeypatch.setattr("fluidbench.job.code", lambda method, backend: {"sources": f"{method} {backend}"})
     monkeypatch.setattr(execution, "hardware", lambda target: dict.fromkeys(provenance.HARDWARE, "here"))
     job = Job(TABLE, "mpm")
     machine = dict.fromkeys(provenance.HARDWARE, "here") | {"load": "9"}
@@ -275,7 +275,7 @@ def test_a_fresh_store_makes_each_run_once(tmp_path, monkeypatch):
         made.append(job)
         machine = execution.hardware(job.target)
         return write_record(folder, job.heading() | {"verdict": "completed", "machine": machine, "film_every": None,
-                                                     "code": execution.code("mpm", "warp"), "files": {}})  # fmt: skip
+                                                     "files": {}})  # fmt: skip
 
     monkeypatch.setattr(execution, "launch", launch)
     nothing = Hooks(*[lambda *_: None] * 3, lambda _: None)
