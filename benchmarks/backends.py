@@ -15,17 +15,17 @@ import sys
 import tempfile
 import time
 
-from fluidbench.library import load
-from fluidbench.solver import solver_names
-from fluidbench.target import BACKENDS, Target
+from fluidbench.method.target import BACKENDS, Target
+from fluidbench.registry import method_names
+from fluidbench.scenario.library import load
 
 WARMUP_TICKS = 3
 
 
 def measure(method: str, target: Target, particles: int, seconds: float) -> dict[str, float]:
     """Particle-substeps a second of wall and CPU time over whole ticks, and the seconds to compile."""
-    from fluidbench.device import quiet_warp
-    from fluidbench.simulation import Simulation
+    from fluidbench.native.device import quiet_warp
+    from fluidbench.native.simulation import Simulation
 
     quiet_warp()
     base = load("column_slump", {})
@@ -35,18 +35,21 @@ def measure(method: str, target: Target, particles: int, seconds: float) -> dict
     sim.prepare()
     compiled = time.perf_counter() - start
     for _ in range(WARMUP_TICKS):
-        sim.advance()
+        sim.advance_tick()
     sim.look()
     wall, cpu, substeps = time.perf_counter(), time.process_time(), 0
     while time.perf_counter() - wall < seconds:
-        substeps += sim.advance().substeps
+        substeps += sim.advance_tick().substeps
         vital = sim.look()
         assert not vital.complaint, vital.complaint
     wall, cpu, active = time.perf_counter() - wall, time.process_time() - cpu, sum(sim.pool.counts)
     return {
-        "particles": active, "compile_s": compiled, "substeps_per_s": substeps / wall,
-        "per_wall_s": substeps * active / wall, "per_cpu_s": substeps * active / cpu,
-    }  # fmt: skip
+        "particles": active,
+        "compile_s": compiled,
+        "substeps_per_s": substeps / wall,
+        "per_wall_s": substeps * active / wall,
+        "per_cpu_s": substeps * active / cpu,
+    }
 
 
 def apart(method: str, target: Target, particles: int, seconds: float) -> dict[str, float]:
@@ -65,7 +68,7 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--particles", type=int, default=25_000)
     parser.add_argument("--seconds", type=float, default=5.0)
-    parser.add_argument("--solvers", default=",".join(solver_names()))
+    parser.add_argument("--solvers", default=",".join(method_names()))
     parser.add_argument("--one", help=argparse.SUPPRESS)
     a = parser.parse_args()
     if a.one:
@@ -74,15 +77,33 @@ def main() -> None:
         return
     threads = sorted({1, os.cpu_count() or 1}) if a.device == "cpu" else [1]
     targets = [Target(a.device, b, n) for b in BACKENDS for n in threads if b != "warp" or n == 1]
-    head = ["method", "backend", "device", "threads", "particles", "particle-substeps/s", "the same per CPU s",
-            "substeps/s", "compile s"]  # fmt: skip
+    head = [
+        "method",
+        "backend",
+        "device",
+        "threads",
+        "particles",
+        "particle-substeps/s",
+        "the same per CPU s",
+        "substeps/s",
+        "compile s",
+    ]
     print(f"| {' | '.join(head)} |\n{'| --- ' * len(head)}|")
     for method in a.solvers.split(","):
         for t in targets:
             r = apart(method, t, a.particles, a.seconds)
             threads = t.threads if t.device == "cpu" else "-"
-            cells = [method, t.backend, t.device, threads, r["particles"], f"{r['per_wall_s']:.3g}",
-                     f"{r['per_cpu_s']:.3g}", f"{r['substeps_per_s']:.4g}", f"{r['compile_s']:.3g}"]  # fmt: skip
+            cells = [
+                method,
+                t.backend,
+                t.device,
+                threads,
+                r["particles"],
+                f"{r['per_wall_s']:.3g}",
+                f"{r['per_cpu_s']:.3g}",
+                f"{r['substeps_per_s']:.4g}",
+                f"{r['compile_s']:.3g}",
+            ]
             print(f"| {' | '.join(map(str, cells))} |", flush=True)
 
 

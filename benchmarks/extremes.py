@@ -12,12 +12,15 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 
-from fluidbench.device import quiet_warp
 from fluidbench.errors import UserError
-from fluidbench.library import load
+from fluidbench.method.suitability import refusal
+from fluidbench.native.device import quiet_warp
+from fluidbench.native.simulation import Simulation
+from fluidbench.registry import get_method
+from fluidbench.runs.drive import Drive
 from fluidbench.scenario import Scenario
-from fluidbench.simulation import Simulation
-from fluidbench.solver import configure, get_solver, refusal
+from fluidbench.scenario.library import load
+from fluidbench.scenario.numerics import configure
 from fluidbench.study.limits import default_dt, lump
 from fluidbench.study.stability import AXES, varied
 
@@ -34,7 +37,7 @@ def value_on(axis, rng: np.random.Generator) -> float:
 
 def thrown(scenario: Scenario, method: str) -> tuple[str, str]:
     """(how the lump ended, why): held, refused, diverged, or FALSE where a result is none."""
-    solver = get_solver(method)
+    solver = get_method(method)
     try:
         config = configure(solver, scenario)
         if reason := refusal(solver, scenario, config):
@@ -45,7 +48,7 @@ def thrown(scenario: Scenario, method: str) -> tuple[str, str]:
     except UserError as error:
         return "refused", str(error).splitlines()[0]
     start = sim.frame()
-    outcome = sim.run(wall_limit=60.0)
+    outcome = Drive(sim, sim.scenario, wall_limit=60.0).run()
     if outcome.verdict != "completed":
         return str(outcome.verdict), outcome.reason
     return ("FALSE", wrong) if (wrong := false_result(start, sim)) else ("held", "")

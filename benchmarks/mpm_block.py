@@ -13,12 +13,12 @@ import time
 
 import warp as wp
 
-from fluidbench.body import Body
-from fluidbench.device import quiet_warp
-from fluidbench.material import Material
+from fluidbench.method.target import Target
+from fluidbench.native.device import quiet_warp
+from fluidbench.native.simulation import Simulation
 from fluidbench.scenario import Domain, Scenario
-from fluidbench.simulation import Simulation
-from fluidbench.target import Target
+from fluidbench.scenario.body import Body
+from fluidbench.scenario.material import Material
 
 SPACING, CELLS, DT, SUBSTEPS = 7e-3, 64, 1e-4, 10
 
@@ -60,12 +60,17 @@ def measure(particles: int, device: str, steps: int, warmup: int) -> dict[str, o
     n = simulation.pool.counts[0]
     vital = simulation.look()
     return {
-        "benchmark": "mpm_block", "device": device, "particles": n, "steps": steps, "steps_per_s": steps / wall,
+        "benchmark": "mpm_block",
+        "device": device,
+        "particles": n,
+        "steps": steps,
+        "steps_per_s": steps / wall,
         "particle_substeps_per_s": n * steps * SUBSTEPS / wall,
         "particle_substeps_per_cpu_s": n * steps * SUBSTEPS / cpu,
         "microseconds_a_substep": 1e6 * wall / (steps * SUBSTEPS),
-        "top_speed_m_s": vital.speed, "complaint": vital.complaint,
-    }  # fmt: skip
+        "top_speed_m_s": vital.speed,
+        "complaint": vital.complaint,
+    }
 
 
 def main() -> None:

@@ -6,12 +6,12 @@ python benchmarks/sph_dam.py --particles 20000 --simulated 0.33
 import argparse
 import json
 
-from fluidbench.body import Body
-from fluidbench.device import quiet_warp
-from fluidbench.material import Material
+from fluidbench.method.target import Target
+from fluidbench.native.device import quiet_warp
+from fluidbench.native.simulation import Simulation
 from fluidbench.scenario import Domain, Scenario, Walls
-from fluidbench.simulation import Simulation
-from fluidbench.target import Target
+from fluidbench.scenario.body import Body
+from fluidbench.scenario.material import Material
 
 
 def dam(particles: int, simulated: float, depth: float) -> Scenario:
@@ -38,12 +38,20 @@ def main() -> None:
     a = parser.parse_args()
     quiet_warp()
     outcome = Simulation(dam(a.particles, a.simulated, a.depth), "sph", Target(a.device)).run()
-    print(json.dumps({
-        "benchmark": "sph_dam", "device": a.device, "particles": outcome.peak_particles, "verdict": outcome.verdict,
-        "substeps": outcome.substeps, "simulated_s": outcome.time,
-        "particle_steps_per_s": outcome.particle_substeps / outcome.wall,
-        "particle_steps_per_cpu_s": outcome.particle_substeps / outcome.cpu,
-    }))  # fmt: skip
+    print(
+        json.dumps(
+            {
+                "benchmark": "sph_dam",
+                "device": a.device,
+                "particles": outcome.peak_particles,
+                "verdict": outcome.verdict,
+                "substeps": outcome.substeps,
+                "simulated_s": outcome.time,
+                "particle_steps_per_s": outcome.particle_substeps / outcome.wall,
+                "particle_steps_per_cpu_s": outcome.particle_substeps / outcome.cpu,
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

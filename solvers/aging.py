@@ -7,7 +7,7 @@ Growth: rest volume grows while the present volume stays, so fresh foam is under
 
 import warp as wp
 
-from fluidbench.scene import Phase
+from fluidbench.native.scene import Phase
 
 from . import constitutive
 from .bind import warp_func
@@ -47,10 +47,13 @@ def rest_density(mass: wp.array(dtype=float), volume: wp.array(dtype=float), i: 
 
 @wp.kernel
 def swell(
-    capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), growth: wp.array(dtype=float),
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    growth: wp.array(dtype=float),
     # outputs
     volume: wp.array(dtype=float),
-):  # fmt: skip
+):
     """Rest volume grows at `growth` [1/s]."""
     i = wp.tid()
     world = i / capacity
@@ -60,10 +63,14 @@ def swell(
 
 @wp.kernel
 def swell_at_volume(
-    capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), growth: wp.array(dtype=float),
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    growth: wp.array(dtype=float),
     # outputs
-    volume: wp.array(dtype=float), volume_ratio: wp.array(dtype=float),
-):  # fmt: skip
+    volume: wp.array(dtype=float),
+    volume_ratio: wp.array(dtype=float),
+):
     """The same for a method that integrates J: an eigenstrain, the present volume V0 J stays."""
     i = wp.tid()
     world = i / capacity
@@ -85,10 +92,16 @@ def relieve(
 
 @wp.kernel
 def harden(
-    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    elastic: int,
+    capacity: int,
+    count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    due: wp.array(dtype=int),
     # outputs
-    phase_of: wp.array(dtype=int), elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+    phase_of: wp.array(dtype=int),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+):
     """Move particles to the phase they are due, for a method without a pressure law."""
     i = wp.tid()
     world = i / capacity
@@ -100,11 +113,17 @@ def harden(
 
 @wp.kernel
 def harden_at_ratio(
-    capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
+    capacity: int,
+    count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    due: wp.array(dtype=int),
     # outputs
-    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), volume_ratio: wp.array(dtype=float),
-    elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+    phase_of: wp.array(dtype=int),
+    volume: wp.array(dtype=float),
+    volume_ratio: wp.array(dtype=float),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+):
     """The same for a method that integrates J: the present volume V0 J stays."""
     i = wp.tid()
     world = i / capacity
@@ -120,12 +139,19 @@ def harden_at_ratio(
 
 @wp.kernel
 def harden_at_density(
-    elastic: int, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase), due: wp.array(dtype=int),
-    mass: wp.array(dtype=float), density: wp.array(dtype=float),
+    elastic: int,
+    capacity: int,
+    count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    due: wp.array(dtype=int),
+    mass: wp.array(dtype=float),
+    density: wp.array(dtype=float),
     # outputs
-    phase_of: wp.array(dtype=int), volume: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
+    phase_of: wp.array(dtype=int),
+    volume: wp.array(dtype=float),
+    elastic_normal: wp.array(dtype=wp.vec3),
     elastic_shear: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     """The same for a method that integrates density, which stays."""
     i = wp.tid()
     world = i / capacity

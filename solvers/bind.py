@@ -7,6 +7,7 @@ A law is a function of floats with one `return`, at its end, that uses only arit
 import functools
 import types
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import warp as wp
 
@@ -22,7 +23,7 @@ def rebound(law: Callable, names: Mapping[str, object]) -> Callable:
 
 
 @functools.cache
-def warp_func(law: Callable, *inner: Callable) -> wp.Function:
+def warp_func(law: Callable, *inner: Callable) -> Any:
     """The law as a Warp function; `inner` are the laws that it calls, in order of their own needs."""
     names = dict(WARP_NAMES)
     for function in inner:

@@ -55,12 +55,28 @@ def flow_stress(trial: float, threshold: float, consistency: float, index: float
 
 
 def strain_and_flow(
-    l_xx: float, l_xy: float, l_xz: float,
-    l_yx: float, l_yy: float, l_yz: float,
-    l_zx: float, l_zy: float, l_zz: float,
-    b_xx: float, b_yy: float, b_zz: float, b_xy: float, b_xz: float, b_yz: float,
-    shear_modulus: float, threshold: float, consistency: float, index: float, relaxation: float, dt: float,
-):  # fmt: skip
+    l_xx: float,
+    l_xy: float,
+    l_xz: float,
+    l_yx: float,
+    l_yy: float,
+    l_yz: float,
+    l_zx: float,
+    l_zy: float,
+    l_zz: float,
+    b_xx: float,
+    b_yy: float,
+    b_zz: float,
+    b_xy: float,
+    b_xz: float,
+    b_yz: float,
+    shear_modulus: float,
+    threshold: float,
+    consistency: float,
+    index: float,
+    relaxation: float,
+    dt: float,
+):
     """b after a step dt [s] under the velocity gradient l_ij = dv_i/dx_j [1/s]: (xx, yy, zz, xy, xz, yz).
 
     Trial: b <- A b A^T, A = 1 + dt dev(l). With relaxation = 0, sqrt(J2) = G |dev b| / sqrt(2) returns to
@@ -124,7 +140,7 @@ def relieved(b_xx: float, b_yy: float, b_zz: float, b_xy: float, b_xz: float, b_
     """b, det b = 1, whose deviator is `ratio` times that of the given one: (xx, yy, zz, xy, xz, yz).
 
     With ratio = G / G' the shear stress G dev(b) carries over when the modulus changes from G to G': bonds that form
-    while a material cures form without stress (validation E, stiffening_under_load). The mean m of the new b solves
+    while a material cures form without stress (references.md, E, stiffening_under_load). The mean m of the new b solves
     det(m 1 + s) = m^3 - J2 m + det s = 1; Newton from 1.
     """
     mean = (b_xx + b_yy + b_zz) / 3.0

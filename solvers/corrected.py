@@ -8,7 +8,7 @@ CMAME 180:97).
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, SLIP, Box
+from fluidbench.native.scene import FRICTION, SLIP, Box
 
 from .neighbours import face_kind
 

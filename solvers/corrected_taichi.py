@@ -1,6 +1,6 @@
 """Corrected kernel gradients and stresses seen in walls, in Taichi: see corrected.py."""
 
-from fluidbench.scene import FRICTION, SLIP
+from fluidbench.native.scene import FRICTION, SLIP
 
 from .corrected import SINGULAR, SOUND
 from .neighbours_taichi import face_kind

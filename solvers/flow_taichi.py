@@ -11,7 +11,26 @@ strain_and_flow = taichi_func(constitutive.strain_and_flow, constitutive.flow_st
 def strained(phase, modulus, l, b, s, h):
     """The elastic tensor after a step h [s] under the velocity gradient l: its diagonal b, and s: xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = strain_and_flow(
-        l[0, 0], l[0, 1], l[0, 2], l[1, 0], l[1, 1], l[1, 2], l[2, 0], l[2, 1], l[2, 2], b[0], b[1], b[2], s[0], s[1],
-        s[2], modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index, phase.relaxation_rate, h,
-    )  # fmt: skip
+        l[0, 0],
+        l[0, 1],
+        l[0, 2],
+        l[1, 0],
+        l[1, 1],
+        l[1, 2],
+        l[2, 0],
+        l[2, 1],
+        l[2, 2],
+        b[0],
+        b[1],
+        b[2],
+        s[0],
+        s[1],
+        s[2],
+        modulus,
+        phase.yield_stress,
+        phase.plastic_viscosity,
+        phase.flow_index,
+        phase.relaxation_rate,
+        h,
+    )
     return vec3(xx, yy, zz), vec3(xy, xz, yz)

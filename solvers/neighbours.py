@@ -10,9 +10,9 @@ import math
 import numpy as np
 import warp as wp
 
-from fluidbench.expansion import Expansion
-from fluidbench.particles import Pool
-from fluidbench.scene import PERIODIC, STICK, Box, Scene
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import PERIODIC, STICK, Box, Scene
+from fluidbench.scenario.expansion import Expansion
 
 from .backends import Backend
 
@@ -145,11 +145,14 @@ def contained(box: Box, x: wp.vec3, inset: float):
 
 @wp.kernel
 def watch(
-    capacity: int, count: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), listed: wp.array(dtype=wp.vec3),
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    listed: wp.array(dtype=wp.vec3),
     limit2: float,
     # outputs
     outdated: wp.array(dtype=int),
-):  # fmt: skip
+):
     """Mark the lists outdated once a particle has moved half the skin since they were made."""
     i = wp.tid()
     if i % capacity < count[i / capacity]:
@@ -202,12 +205,22 @@ def opposite(code: int):
 
 @wp.kernel
 def fill_lists(
-    grid: wp.uint64, box: Box, group: wp.array(dtype=int), worlds: int, reach: float, limit: int, row: int, column: int,
+    grid: wp.uint64,
+    box: Box,
+    group: wp.array(dtype=int),
+    worlds: int,
+    reach: float,
+    limit: int,
+    row: int,
+    column: int,
     position: wp.array(dtype=wp.vec3),
     # outputs
-    entries: wp.array(dtype=int), number: wp.array(dtype=int), listed: wp.array(dtype=wp.vec3),
-    fault: wp.array(dtype=int), outdated: wp.array(dtype=int),
-):  # fmt: skip
+    entries: wp.array(dtype=int),
+    number: wp.array(dtype=int),
+    listed: wp.array(dtype=wp.vec3),
+    fault: wp.array(dtype=int),
+    outdated: wp.array(dtype=int),
+):
     """All neighbours within reach, images included.
 
     Periodic images are found by asking the grid at the shifted place. Mirror images need no search: a particle is
@@ -319,10 +332,19 @@ class Neighbours:
         self.backend.launch(
             fill_lists,
             pool.size,
-            [self.grid.id, self.scene.box, self.group, pool.worlds, self.reach, self.limit, self.row, self.column,
-             pool.position],
+            [
+                self.grid.id,
+                self.scene.box,
+                self.group,
+                pool.worlds,
+                self.reach,
+                self.limit,
+                self.row,
+                self.column,
+                pool.position,
+            ],
             [self.entries, self.number, self.listed, pool.fault, self.outdated],
-        )  # fmt: skip
+        )
 
     def carried(self) -> dict[str, wp.array]:
         """The lists as they are: made anew, they would be summed over in another order."""

@@ -6,7 +6,7 @@ key. Buckets get their places in no order: a counter hands them out.
 
 import warp as wp
 
-from fluidbench.scene import PERIODIC, STICK, Box
+from fluidbench.native.scene import PERIODIC, STICK, Box
 
 from .neighbours import FAULT_NEIGHBOURS, INDEX_BITS, INDEX_MASK, Lists, Neighbours
 from .taichi_bridge import Ints, Vectors, ivec3, struct_of, ti, vec3
@@ -132,9 +132,16 @@ def watch(capacity: int, count: Ints, position: Vectors, listed: Vectors, limit2
 
 @ti.kernel
 def build(
-    capacity: int, width: float, count: Ints, position: Vectors, outdated: Ints,
-    key: Keys, start: Ints, filled: Ints, members: Ints,
-):  # fmt: skip
+    capacity: int,
+    width: float,
+    count: Ints,
+    position: Vectors,
+    outdated: Ints,
+    key: Keys,
+    start: Ints,
+    filled: Ints,
+    members: Ints,
+):
     """Sort particles into buckets, where lists are outdated: count, hand out places, fill."""
     stale = outdated[0]
     for bucket in range(start.shape[0]):
@@ -184,10 +191,24 @@ def allowed(near, code):
 
 @ti.kernel
 def fill_lists(
-    capacity: int, box: BoxT, reach: float, limit: int, row: int, column: int, count: Ints, position: Vectors,
-    key: Keys, start: Ints, filled: Ints, members: Ints,
-    entries: Ints, number: Ints, listed: Vectors, fault: Ints, outdated: Ints,
-):  # fmt: skip
+    capacity: int,
+    box: BoxT,
+    reach: float,
+    limit: int,
+    row: int,
+    column: int,
+    count: Ints,
+    position: Vectors,
+    key: Keys,
+    start: Ints,
+    filled: Ints,
+    members: Ints,
+    entries: Ints,
+    number: Ints,
+    listed: Vectors,
+    fault: Ints,
+    outdated: Ints,
+):
     """All neighbours within reach, images included: for every periodic shift the 27 cells around the shifted place,
     then the mirror images of those found."""
     stale = outdated[0]
@@ -258,11 +279,21 @@ class TaichiNeighbours(Neighbours):
             build, pool.size, [pool.capacity, self.reach, pool.count, pool.position, self.outdated], cells
         )
         self.backend.launch(
-            fill_lists, pool.size,
-            [pool.capacity, self.scene.box, self.reach, self.limit, self.row, self.column, pool.count, pool.position,
-             *cells],
+            fill_lists,
+            pool.size,
+            [
+                pool.capacity,
+                self.scene.box,
+                self.reach,
+                self.limit,
+                self.row,
+                self.column,
+                pool.count,
+                pool.position,
+                *cells,
+            ],
             [self.entries, self.number, self.listed, pool.fault, self.outdated],
-        )  # fmt: skip
+        )
 
     def footprint(self) -> dict[str, int]:
         cells = sum(array.capacity for array in (self.key, self.start, self.filled, self.members))

@@ -3,17 +3,22 @@
 import numpy as np
 import warp as wp
 
-from fluidbench.particles import Pool
-from fluidbench.scene import Scene
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import Scene
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.kernel
 def cell_keys(
-    lower: wp.vec3, inv_cell: wp.vec3, cells: wp.vec3i, capacity: int, count: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), keys: wp.array(dtype=wp.int64),
-):  # fmt: skip
+    lower: wp.vec3,
+    inv_cell: wp.vec3,
+    cells: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    keys: wp.array(dtype=wp.int64),
+):
     """World, then blocks of 4 x 4 x 4 cells, then cells; unused slots come last within their world."""
     p = wp.tid()
     world = p / capacity
@@ -47,8 +52,15 @@ class CellOrder:
         wp.launch(
             cell_keys,
             self.pool.size,
-            [self.lower, self.inverse, self.blocks, self.pool.capacity, self.pool.count,
-             self.pool.position, self.values],
+            [
+                self.lower,
+                self.inverse,
+                self.blocks,
+                self.pool.capacity,
+                self.pool.count,
+                self.pool.position,
+                self.values,
+            ],
             device=self.scene.device,
-        )  # fmt: skip
+        )
         return self.values

@@ -17,9 +17,9 @@ import warp as wp
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 import taichi as ti
 
-from fluidbench.device import note_launch
 from fluidbench.errors import UserError
-from fluidbench.scene import Phase
+from fluidbench.native.device import note_launch
+from fluidbench.native.scene import Phase
 
 from .bind import rebound
 
@@ -43,9 +43,13 @@ def start(device: str, threads: int) -> None:
     if not _running:
         with contextlib.redirect_stdout(io.StringIO()):
             ti.init(
-                arch=getattr(ti, wanted[0]), cpu_max_num_threads=threads, default_fp=ti.f32, default_ip=ti.i32,
-                offline_cache=True, log_level=ti.ERROR,
-            )  # fmt: skip
+                arch=getattr(ti, wanted[0]),
+                cpu_max_num_threads=threads,
+                default_fp=ti.f32,
+                default_ip=ti.i32,
+                offline_cache=True,
+                log_level=ti.ERROR,
+            )
         if ti.cfg.arch not in ({ti.x64, ti.arm64} if wanted[0] == "cpu" else {ti.cuda}):
             raise UserError(f"taichi could not start on {wanted[0]} and took {ti.cfg.arch} instead")
         _running.append(wanted)
@@ -57,8 +61,13 @@ def start(device: str, threads: int) -> None:
 def taichi_func(law: Callable, *inner: Callable) -> Callable:
     """A law as a Taichi function, see bind.py; `inner` are the laws that it calls, in order of their own needs."""
     names: dict[str, object] = {
-        "sqrt": ti.sqrt, "exp": ti.exp, "pow": ti.pow, "min": ti.min, "max": ti.max, "abs": ti.abs,
-    }  # fmt: skip
+        "sqrt": ti.sqrt,
+        "exp": ti.exp,
+        "pow": ti.pow,
+        "min": ti.min,
+        "max": ti.max,
+        "abs": ti.abs,
+    }
     for function in inner:
         names[function.__name__] = taichi_func(function)
     return ti.func(rebound(law, names))
@@ -77,10 +86,19 @@ PhaseT = struct_of(Phase)
 def phase_at(phases: ti.template(), world, level):
     """A row of the phase table."""
     return PhaseT(
-        phases[world, level, 0], phases[world, level, 1], phases[world, level, 2], phases[world, level, 3],
-        phases[world, level, 4], phases[world, level, 5], phases[world, level, 6], phases[world, level, 7],
-        phases[world, level, 8], phases[world, level, 9], phases[world, level, 10], phases[world, level, 11],
-    )  # fmt: skip
+        phases[world, level, 0],
+        phases[world, level, 1],
+        phases[world, level, 2],
+        phases[world, level, 3],
+        phases[world, level, 4],
+        phases[world, level, 5],
+        phases[world, level, 6],
+        phases[world, level, 7],
+        phases[world, level, 8],
+        phases[world, level, 9],
+        phases[world, level, 10],
+        phases[world, level, 11],
+    )
 
 
 @ti.func
@@ -133,8 +151,11 @@ class _Header:
         elif hasattr(dtype, "_shape_"):
             inner, dtype = dtype._shape_, dtype._wp_scalar_type_
         self.__array_interface__ = {
-            "data": (array.ptr, False), "shape": (*array.shape, *inner), "typestr": TYPESTR[dtype], "version": 3,
-        }  # fmt: skip
+            "data": (array.ptr, False),
+            "shape": (*array.shape, *inner),
+            "typestr": TYPESTR[dtype],
+            "version": 3,
+        }
 
 
 class Taichi:

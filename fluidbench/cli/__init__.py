@@ -7,11 +7,10 @@ from typing import NoReturn
 import typer
 
 from ..errors import Interrupted, Obstacle, UserError, quoted
-
-from . import runs, studies, pictures, info  # isort: skip  (the order of the verbs in --help)
+from . import engines, info, pictures, runs, studies
 from .app import app
 
-__all__ = ["app", "info", "main", "pictures", "runs", "studies"]
+__all__ = ["app", "engines", "info", "main", "pictures", "runs", "studies"]
 USAGE = typer.BadParameter.__base__  # what the parser raises; its module differs between versions
 MOST_LINES = 6
 

@@ -2,15 +2,17 @@
 
 import typer
 
-from .app import ScenarioName, Settings, Spacing, app, load_scenario
+from .app import app
+from .options import ScenarioName, Settings, Spacing, load_scenario
 
 
 @app.command("list")
 def list_() -> None:
     """Shipped scenarios, cases with known answers and installed methods, one line each."""
-    from ..library import load, shipped
-    from ..solver import get_solver, solver_names
+    from ..registry import get_method
+    from ..scenario.library import load, shipped
     from ..study.case import cases
+    from ..study.workplace import methods_of
 
     typer.echo("scenarios")
     for name in shipped():
@@ -19,8 +21,8 @@ def list_() -> None:
     for name, case in cases().items():
         typer.echo(f"  {name:<20} {case.title} ({case.physics})")
     typer.echo("solvers")
-    for name in solver_names():
-        typer.echo(f"  {name:<20} {(get_solver(name).__doc__ or '').strip().splitlines()[0]}")
+    for name in methods_of(None):
+        typer.echo(f"  {name:<20} {(get_method(name).__doc__ or '').strip().splitlines()[0]}")
 
 
 @app.command()
@@ -28,8 +30,8 @@ def show(scenario: ScenarioName, set_: Settings = None, spacing: Spacing = None)
     """The resolved scenario, its derived numbers, each method's bounds, and what a run will need."""
     from rich.console import Console
 
-    from ..report.preview import preview
-    from ..report.tables import show as print_table
+    from ..report.table import show as print_table
+    from ..study.preview import preview
 
     resolved = load_scenario(scenario, set_, spacing)
     console = Console()
@@ -42,7 +44,7 @@ def show(scenario: ScenarioName, set_: Settings = None, spacing: Spacing = None)
 @app.command()
 def doctor() -> None:
     """Devices and versions, what is missing and how to get it."""
-    from ..report.preview import diagnosis
+    from ..study.preview import diagnosis
 
     for line in diagnosis():
         typer.echo(line)

@@ -2,15 +2,13 @@
 
 import numpy as np
 
-from ..layout import emitted
-from ..particles import CARRIED
+from ..method.frame import CARRIED, Frame
 from ..scenario import Scenario
+from ..scenario.layout import emitted
 from .bead import laid_share, layer_heights, measure_bead
 from .deposit import Deposit
 from .slump import measure_slump
 from .tower import family_spread, is_tower, measure_tower, progress, standing
-
-Frame = dict[str, np.ndarray]
 
 
 def deposit_of(frame: Frame, scenario: Scenario) -> Deposit:

@@ -1,10 +1,9 @@
-"""Measures of fields: error norms, Fourier amplitudes, shapes of drops, periods (validation section 0)."""
+"""Measures of fields: error norms, Fourier amplitudes, shapes of drops, periods (references.md, conventions)."""
 
 import numpy as np
 
+from ..method.frame import Frame
 from .deposit import Deposit
-
-Frame = dict[str, np.ndarray]
 
 
 def relative_l2(values: np.ndarray, reference: np.ndarray) -> float:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..process.stream import Stream
 from ..scenario import Scenario
+from ..scenario.library import reference_table
+from ..scenario.stream import Stream
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,9 +35,7 @@ def table(name: str) -> pd.DataFrame:
     """A reference table of the package."""
     import pandas as pd
 
-    import scenarios
-
-    return pd.read_csv(Path(scenarios.__file__).parent / "reference" / f"{name}.csv", comment="#")
+    return pd.read_csv(reference_table(name), comment="#")
 
 
 class DoesNotApply(Exception):
@@ -119,7 +117,7 @@ def martin_moyce(scenario: Scenario) -> tuple[float, float, pd.DataFrame]:
     table being that of its proportions n^2 = 1 or 2; raises DoesNotApply for others."""
     g = -float(scenario.acceleration[2])
     body = scenario.bodies[0] if scenario.bodies else None
-    if body is None or body.kind != "box" or g <= 0:
+    if body is None or body.kind != "box" or body.where is not None or g <= 0:
         raise DoesNotApply("front against Martin & Moyce: it is of one column of a liquid in a box, with gravity")
     a, ratio = float(2.0 * body.extent[0]), float(body.extent[2] / body.extent[0])
     nearest = min((1, 2), key=lambda n: abs(ratio - n))
@@ -150,6 +148,10 @@ def _front(scenario: Scenario, series: pd.DataFrame) -> Answer:
     best = int(np.argmin(errors))
     z = float(np.interp(reached[best][-1], clock, series["front_x_m"] / a))
     return Answer(
-        f"front Z at T = {float(data['T'].iloc[-1]):g}", z, float(data["Z"].iloc[-1]), errors[best],
-        f"RMS over 0.84 <= T <= 3.33, clock shifted by {shifts[best]:+.2f}", "Martin & Moyce 1952",
-    )  # fmt: skip
+        f"front Z at T = {float(data['T'].iloc[-1]):g}",
+        z,
+        float(data["Z"].iloc[-1]),
+        errors[best],
+        f"RMS over 0.84 <= T <= 3.33, clock shifted by {shifts[best]:+.2f}",
+        "Martin & Moyce 1952",
+    )

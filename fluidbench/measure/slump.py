@@ -12,7 +12,7 @@ def measure_slump(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
         return {}
     body, floor = scenario.bodies[0], scenario.domain.lower[2]
     start = float(body.center[2] + body.extent[2]) - floor
-    if body.kind == "cylinder":
+    if body.kind == "cylinder" and body.where is None:
         x, y = body.center[0], body.center[1]
         top = deposit.top(x, y, within=0.25 * float(body.extent[0])) - floor
         return {"slump": 1.0 - top / start, "spread_radius_m": spread_radius(deposit, x, y)}
@@ -22,7 +22,7 @@ def measure_slump(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
 
 
 def front(deposit: Deposit) -> float:
-    """x at which the height averaged over y falls below one spacing [m], interpolated (validation section 0)."""
+    """x at which the height averaged over y falls below one spacing [m], interpolated (references.md, conventions)."""
     x, _, heights = deposit.column_heights()
     return _falls_below(x, heights.mean(axis=1), deposit.spacing)
 

@@ -4,14 +4,14 @@ Particles belong to the layer during which they (or their ancestor) left the noz
 the path, in sectors no shorter than the deposit resolves, from what fills space: a lone particle decides nothing.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
-from ..particles import CARRIED
+from ..method.frame import CARRIED, Frame
 from ..scenario import Scenario
 from .deposit import Deposit
 
@@ -21,7 +21,6 @@ THIN = 0.4  # share of the mass laid per length below which a layer is broken
 BESIDE = 1.5  # nozzle diameters from the path (of expanded material) beyond which material is not its layer any more
 SPAN = (0.05, 0.95)  # quantiles of mass between which a layer's width is taken
 HEIGHT_TOLERANCE, RADIUS_TOLERANCE, CREEP, WHOLE = 0.25, 0.10, 0.05, 0.95
-Frame = Mapping[str, np.ndarray]
 
 
 class Print(StrEnum):
@@ -227,7 +226,7 @@ def family_spread(frame: Frame, ancestors: int) -> float:
     return float(np.sqrt(np.average((arm[many] ** 2).sum(axis=1), weights=m[many])))
 
 
-def success(scenario: Scenario, measures: Mapping[str, float], series: Any) -> list[dict[str, Any]]:
+def success(scenario: Scenario, measures: Mapping[str, float], series: Any) -> list[Criterion]:
     """The paper's conditions, each alone: layers complete and continuous, height and radius within tolerance, stable
     after the last layer. `series` is the table of measures over time."""
     path, track = scenario.toolpath, scenario.track
@@ -241,11 +240,16 @@ def success(scenario: Scenario, measures: Mapping[str, float], series: Any) -> l
     found = [
         Criterion("layers laid", len(laid), f"{path.layers}", len(laid) == path.layers, Print.INCOMPLETE),
         Criterion("path travelled", min(end / track.end, 1.0), "1", end >= track.end * (1 - 1e-6), Print.INCOMPLETE),
-        Criterion("height over plan", tall, f"1 ± {HEIGHT_TOLERANCE:g}", abs(tall - 1) <= HEIGHT_TOLERANCE,
-                  Print.COLLAPSED if tall < 1 else Print.DEFORMED),
+        Criterion(
+            "height over plan",
+            tall,
+            f"1 ± {HEIGHT_TOLERANCE:g}",
+            abs(tall - 1) <= HEIGHT_TOLERANCE,
+            Print.COLLAPSED if tall < 1 else Print.DEFORMED,
+        ),
         Criterion("share of the path that stands", stands, f">= {WHOLE:g}", stands >= WHOLE, Print.COLLAPSED),
         Criterion("continuity of the worst layer", worst, f">= {WHOLE:g}", worst >= WHOLE, Print.BROKEN),
-    ]  # fmt: skip
+    ]
     if path.kind == "ring" and path.radius:
         off = max((abs(measures[f"{n}_radius_m"] / path.radius - 1) for n in laid), default=1.0)
         met = off <= RADIUS_TOLERANCE
@@ -253,10 +257,10 @@ def success(scenario: Scenario, measures: Mapping[str, float], series: Any) -> l
     after = series.loc[series["time_s"] >= track.end, "print_height_m"].tolist()
     sunk = 1.0 - after[-1] / after[0] if len(after) > 1 and after[0] > 0 else float("nan")
     found.append(Criterion("sunk after the last layer", sunk, f"<= {CREEP:g}", bool(sunk <= CREEP), Print.DEFORMED))
-    return [vars(c) | {"met": bool(c.met), "failure": str(c.failure)} for c in found]
+    return [replace(c, met=bool(c.met)) for c in found]
 
 
-def verdict_of(criteria: list[dict[str, Any]]) -> Print:
+def verdict_of(criteria: Sequence[Criterion]) -> Print:
     """What became of a print: the worst of what its unmet criteria say; settling that nobody saw says nothing."""
-    failures = {Print(c["failure"]) for c in criteria if not c["met"] and c["measured"] == c["measured"]}
+    failures = {c.failure for c in criteria if not c.met and c.measured == c.measured}
     return next((kind for kind in Print if kind in failures), Print.SOUND)

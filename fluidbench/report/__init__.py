@@ -1,1 +1,1 @@
-"""What a comparison shows: traces (data), figures (files), html (one self-contained page)."""
+"""What studies show: tables, plots and reports as plain data, and the pages, pictures and progress made of them."""

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import UserError, quoted, suggestion
-from ..particles import CARRIED
+from ..files import write_atomically
+from ..method.frame import CARRIED
+from ..runs.record import FINAL_FRAME, Run, recall
+from ..runs.store import RECORD
 from ..scenario import Scenario
-from ..store import RECORD, read_record, write_atomically
 
 COLOURS = ("layer", "phase", "speed", "stress", "density", "height")
 WINDOW, TURNS, FPS = (1280, 960), 90, 20
@@ -31,19 +33,17 @@ def load(folder: Path) -> tuple[Scenario, list[dict[str, np.ndarray]]]:
         raise UserError(f"{shown}: no run here ({getattr(error, 'strerror', None) or error})") from None
     if not there:
         raise UserError(f"{shown}: no run here (no {RECORD}); give a folder such as fluidbench-out/NAME/runs/...")
-    record, why = read_record(folder)
+    record, why = recall(folder)
     if record is None:
         raise UserError(f"{shown}: {why}; the same command that made the run makes it again")
-    if "input" not in record or "final.npz" not in record["files"]:
-        raise UserError(f"{shown}: the run has no particles to show ({record['verdict']}: {record.get('reason', '')})")
-    kept = sorted(name for name in record["files"] if name.startswith("frame_")) or ["final.npz"]
+    if record.input is None or FINAL_FRAME not in record.files:
+        raise UserError(f"{shown}: the run has no particles to show ({record.verdict}: {record.reason})")
+    run = Run(record, folder)
     frames = []
-    for path in (folder / name for name in kept):
-        with np.load(path) as data:
-            frame = {key: data[key] for key in data.files}
+    for frame in run.frames or [run.frame()]:
         free = frame["held"] != CARRIED
         frames.append({key: value if value.ndim == 0 else value[free] for key, value in frame.items()})
-    return Scenario.model_validate(record["input"]), frames
+    return run.scenario, frames
 
 
 def values_of(frame: dict[str, np.ndarray], scenario: Scenario, colour: str) -> np.ndarray:
@@ -110,8 +110,11 @@ class Stage:
         self.plotter.remove_actor("matter", render=False)
         if not len(frame["position"]):
             return
-        style: dict[str, Any] = {"cmap": list(LAYERS), "show_scalar_bar": False} if self.colour == "layer" else {
-            "cmap": "viridis", "scalar_bar_args": {"title": self.colour, "color": "black"}}  # fmt: skip
+        style: dict[str, Any] = (
+            {"cmap": list(LAYERS), "show_scalar_bar": False}
+            if self.colour == "layer"
+            else {"cmap": "viridis", "scalar_bar_args": {"title": self.colour, "color": "black"}}
+        )
         cloud = _cloud(self.pv, frame, self.scenario, self.colour)
         self.plotter.add_mesh(cloud, scalars="value", clim=self.limits, name="matter", smooth_shading=True, **style)
 

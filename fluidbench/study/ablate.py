@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, Unpack
 
 from ..errors import UserError
-from ..job import Job
+from ..method.verdict import lacking
+from ..registry import get_method
+from ..runs.job import Job
+from ..runs.record import Run
 from ..scenario import Friction, Scenario
-from ..solver import configure, get_solver
-from ..store import Store
-from ..target import Target
-from ..verdict import lacking
+from ..scenario.numerics import configure
 from .compare import lengths_of
-from .execute import Finished, Hooks, execute
+from .result import Result
 from .stability import varied
+from .workplace import Options, Workplace, as_scenario, methods_of
 
+WALL_LIMIT = 900.0  # s
 WORTH = 0.05  # a saving below this is lost in the noise of a shared machine
 SOFTER, COARSER, QUIETER = 0.25, 1.25, 0.5  # factors on Young's modulus, spacing, sound speed
 
@@ -36,7 +39,7 @@ class Effect:
 
     change: Change
     method: str
-    run: Finished
+    run: Run
     moved: float = float("nan")
     length: str = ""
     saved: float = float("nan")
@@ -50,15 +53,20 @@ class Effect:
 class Ablation:
     """All effects, for each method the leanest mix that was confirmed by a run, and changes that make no scenario."""
 
-    base: dict[str, Finished]
+    base: dict[str, Run]
     effects: list[Effect] = field(default_factory=list)
     lean: dict[str, Effect] = field(default_factory=dict)
     impossible: list[str] = field(default_factory=list)
 
+    def changed(self) -> list[Run]:
+        return [*(e.run for e in self.effects), *(e.run for e in self.lean.values())]
+
+    def runs(self) -> list[Run]:
+        return [*self.base.values(), *self.changed()]
+
     def missing(self) -> list[str]:
         """Runs that it needed and has nothing of; that a method refuses a change is an answer."""
-        runs = [*(e.run for e in self.effects), *(e.run for e in self.lean.values())]
-        return lacking(self.base.values()) + lacking(runs, refusals=False)
+        return lacking(self.base.values()) + lacking(self.changed(), refusals=False)
 
 
 def changes(scenario: Scenario, methods: Sequence[str]) -> list[Change]:
@@ -81,9 +89,7 @@ def features(scenario: Scenario) -> list[Change]:
     processes = {"curing": "material.cure", "expansion": "material.expansion", "collider": "collider"}
     present = {"curing": m.cure, "expansion": m.expansion, "collider": scenario.collider}
     found += [Change(f"no {name}", {key: None}) for name, key in processes.items() if present[name] is not None]
-    rough = {
-        f"domain.walls.{face}": "slip" for face, wall in scenario.domain.walls if isinstance(wall, Friction)
-    }  # fmt: skip
+    rough = {f"domain.walls.{face}": "slip" for face, wall in scenario.domain.walls if isinstance(wall, Friction)}
     if rough:
         found.append(Change("no friction", rough))
     if scenario.domain.walls.z_lower == "stick":
@@ -98,50 +104,56 @@ def economies(scenario: Scenario, methods: Sequence[str]) -> list[Change]:
         found.append(Change("softer elasticity", {"material.youngs_modulus": SOFTER * m.youngs_modulus}))
     elif m.sound_speed is None and m.bulk_modulus is None:
         found.append(Change("slower sound", {"sound_speed_ratio": QUIETER * scenario.sound_speed_ratio}))
-    for method in methods:
-        config: Any = configure(get_solver(method), scenario)
+    for name in methods:
+        method = get_method(name)
         found += [
-            Change(name, {f"numerics.{method}.{key}": value for key, value in settings.items()}, method)
-            for name, settings in _numerical(method, config, scenario)
+            Change(economy.name, {f"numerics.{name}.{key}": value for key, value in economy.settings.items()}, name)
+            for economy in method.economies(scenario, configure(method, scenario))
         ]
     return found
 
 
-def _numerical(method: str, config: Any, scenario: Scenario) -> list[tuple[str, dict[str, Any]]]:
-    """(name, settings of the method's own section); a method that is not known here has none."""
-    if method == "mpm":
-        return [
-            ("coarser grid", {"grid_ratio": round(min(1.33 * config.grid_ratio, 4.0), 3)}),
-            ("larger dt", {"safety": 1.0}),
-            ("no volume feedback", {"volume_feedback": 0.0}),
-        ]
-    if method == "sph":
-        solid = scenario.material.youngs_modulus is not None
-        key = "smoothing_ratio_solid" if solid else "smoothing_ratio"
-        return [
-            ("fewer neighbours", {key: round(max(0.8 * config.smoothing(solid), 1.2), 3)}),
-            ("larger dt", {"cfl": 2.0 * config.cfl, "viscous_number": 0.11}),
-            ("no density feedback", {"density_feedback": 0.0}),
-        ]
-    if method == "pbd":
-        found = [
-            ("fewer iterations", {"iterations": max(1, config.iterations // 2)}),
-            ("larger dt", {"advance": min(2.0 * config.advance, 1.0)}),
-            ("fewer neighbours", {"support_ratio": 2.0}),
-        ]
-        return [*found, *([("fewer sweeps", {"shear_sweeps": 4})] if scenario.material.viscosity > 0 else [])]
-    return []
+@dataclass(repr=False)
+class Ablated(Result):
+    """What a scenario requires: `table` has a row for every change; `found` is all that it rests on."""
+
+    found: Ablation = field(default_factory=lambda: Ablation({}))
 
 
 def ablate(
-    scenario: Scenario, methods: Sequence[str], tolerance: float, store: Store, hooks: Hooks, workers: int,
-    target: Target, wall_limit: float,
-) -> Ablation:  # fmt: skip
+    scenario: Scenario | str | Path,
+    methods: Sequence[str] | None = None,
+    *,
+    tolerance: float = 0.05,
+    called: str = "",
+    given: Sequence[str] = (),
+    **options: Unpack[Options],
+) -> Ablated:
+    """Switch physical features off and numerical economies on, one at a time: what moves, what is saved. Ends with the
+    leanest mix that moves no length by more than the `tolerance`, a share [-], confirmed by a run.
+
+    `scenario` is one, a shipped name or a TOML file; `methods` are names, default all. `called` and `given` are the
+    scenario's name and settings (key=value) in the commands that it recommends. `options` are those of every verb, see
+    Options.
+
+    Raises UserError for what cannot be run, before anything is.
+    """
+    from .ablate_report import report
+
+    resolved, names = as_scenario(scenario), methods_of(methods, options)
+    place = Workplace.of(options, WALL_LIMIT, names)
+    found = ablation(resolved, names, tolerance, place)
+    made = report(resolved, called or resolved.name, given, found, tolerance, place.store.root)
+    missing = found.missing()
+    return Ablated(made, place.store.root, found.runs(), missing, not missing, place.keeper, found)
+
+
+def ablation(scenario: Scenario, methods: Sequence[str], tolerance: float, place: Workplace) -> Ablation:
     """Run everything; the leanest mixes last."""
 
     def job(settings: dict[str, Any], method: str) -> Job:
         changed = varied(scenario.model_dump(mode="json"), settings)
-        return Job(changed.model_dump(mode="json"), method, target, wall_limit=wall_limit)
+        return Job(changed.model_dump(mode="json"), method, place.target, wall_limit=place.wall_limit)
 
     wanted = [(c, m) for c in changes(scenario, methods) for m in methods if c.method in (None, m)]
     planned, impossible = [], []
@@ -150,27 +162,36 @@ def ablate(
             planned.append((change, method, job(change.settings, method)))
         except UserError as error:  # a nozzle too fine for the coarser spacing, say
             impossible.append(f"{method}: {change.name}: not possible here: {error}")
-    runs = execute([job({}, m) for m in methods] + [j for *_, j in planned], store, hooks, workers)
+    runs = place.run([job({}, m) for m in methods] + [j for *_, j in planned], "ablate", together=True)
+    impossible += [
+        f"{m}: it picks its own step: nothing of its own was relaxed" for m in methods if _steps_itself(m, scenario)
+    ]
     result = Ablation(dict(zip(methods, runs, strict=False)), impossible=impossible)
     for (change, method, _), run in zip(planned, runs[len(methods) :], strict=True):
         result.effects.append(effect(change, method, run, result.base[method]))
     for method in methods:
         if result.base[method].ok:
-            lean = _leanest(result, method, tolerance, lambda s, m: execute([job(s, m)], store, hooks)[0])
+            lean = _leanest(result, method, tolerance, lambda s, m: place.run([job(s, m)], "leanest mix")[0])
             if lean is not None:
                 result.lean[method] = lean
     return result
 
 
-def effect(change: Change, method: str, run: Finished, base: Finished) -> Effect:
+def _steps_itself(name: str, scenario: Scenario) -> bool:
+    method = get_method(name)
+    config = configure(method, scenario)
+    return not method.bounds(scenario, config, scenario.reference_speed) and not method.economies(scenario, config)
+
+
+def effect(change: Change, method: str, run: Run, base: Run) -> Effect:
     """Compare a run with the unchanged one."""
     seen = Effect(change, method, run)
     if run.ok and base.ok:
         before, after = lengths_of(base.record), lengths_of(run.record)
         shifts = {key: abs(after.get(key, 0.0) / value - 1.0) for key, value in before.items() if value}
         seen.length, seen.moved = max(shifts.items(), key=lambda item: item[1], default=("", float("nan")))
-        clock = "cpu_s" if base.record["device"] == "cpu" else "wall_s"
-        seen.saved = 1.0 - run.record["cost"][clock] / base.record["cost"][clock]
+        clock = "cpu_s" if base.record.device == "cpu" else "wall_s"
+        seen.saved = 1.0 - getattr(run.cost, clock) / getattr(base.cost, clock)
     return seen
 
 

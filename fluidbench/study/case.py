@@ -5,67 +5,34 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+import runpy
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
 
 import numpy as np
 
 from ..errors import UserError, quoted, suggestion
+from ..runs.record import Run
 from ..scenario import Scenario
-from .execute import Finished
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PHYSICS = (
-    "kinematics", "emission", "liquid", "viscous", "yield stress", "elastic", "viscoelastic", "process", "numerics",
-)  # fmt: skip
+    "kinematics",
+    "emission",
+    "liquid",
+    "viscous",
+    "yield stress",
+    "elastic",
+    "viscoelastic",
+    "process",
+    "numerics",
+)
 METHOD_OF_LAW = "law"
-
-
-class Run:
-    """A finished run of a case: its record, its scenario and its snapshots over time."""
-
-    def __init__(self, finished: Finished) -> None:
-        self.record, self.folder = finished.record, finished.folder
-        self.method = str(self.record["method"])
-        self.scenario = Scenario.model_validate(self.record["input"])
-
-    @cached_property
-    def frames(self) -> list[dict[str, np.ndarray]]:
-        """Snapshots in order of time; `time` [s] is a 0-d array, see Simulation.frame for the rest."""
-        found = []
-        for name in sorted(name for name in self.record["files"] if name.startswith("frame_")):
-            with np.load(self.folder / name) as data:
-                found.append({key: data[key] for key in data.files})
-        return found
-
-    @cached_property
-    def series(self) -> pd.DataFrame:
-        """The run's measures at every output."""
-        import pandas as pd
-
-        return pd.read_parquet(self.folder / "series.parquet")
-
-    @property
-    def times(self) -> np.ndarray:
-        return np.array([float(frame["time"]) for frame in self.frames])
-
-    def near(self, time: float) -> dict[str, np.ndarray]:
-        """The snapshot nearest to a time [s]."""
-        return self.frames[int(np.argmin(np.abs(self.times - time)))]
-
-    @property
-    def dt(self) -> float:
-        """Mean time step [s]."""
-        return float(self.record["cost"]["mean_dt_s"])
 
 
 @dataclass(frozen=True)
 class Number:
-    """One measured value beside its reference."""
+    """One measured value beside its reference, in the unit that `quantity` ends with: "period [s]"."""
 
     quantity: str
     measured: float
@@ -74,7 +41,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Curve:
-    """A measured profile beside its reference, in the units that the labels say."""
+    """A measured profile beside its reference, in the units that the labels end with: "x [m]"."""
 
     name: str
     x_label: str
@@ -87,7 +54,8 @@ class Curve:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a case measured: the error that is judged, and what stands behind it."""
+    """What a case measured: the error that is judged (a share [-], held against the tolerance), and what stands behind
+    it."""
 
     error: float
     numbers: tuple[Number, ...] = ()
@@ -100,6 +68,7 @@ class Case:
 
     `scenarios` gives the runs needed at a spacing [m], by label; `evaluate` measures them. A law without a flow has
     `drive` instead: it takes a time step (in place of the spacing) and answers at once.
+    `about` names the one method whose numerics it measures, if it does.
     `exempt` says for each method that is not expected to pass why not; `skipped` why it is not even run; `causes` why a
     method that should pass is known to miss.
     """
@@ -120,6 +89,13 @@ class Case:
     skipped: Mapping[str, str] = field(default_factory=dict)
     causes: Mapping[str, str] = field(default_factory=dict)
     quick: float | None = None
+    about: str = ""
+
+    def skips(self, method: str) -> str:
+        """Why a method is not run on it; empty where it is."""
+        if self.about and method != self.about:
+            return f"the case measures the numerics of {self.about}"
+        return self.skipped.get(method, "")
 
     def limit(self, method: str, level_factor: float) -> float:
         """The error allowed for a method at `level_factor` times the coarse spacing; above 1, in proportion."""
@@ -139,17 +115,33 @@ def cases() -> dict[str, Case]:
     return {case.name: case for case in sorted(found, key=lambda c: (PHYSICS.index(c.physics), c.name))}
 
 
-def select(names: list[str]) -> list[Case]:
-    """The cases named, or all; raises UserError with the nearest known name."""
+def select(names: Sequence[str | Path | Case]) -> list[Case]:
+    """The cases named, or all; a name may be that of a Python file, and a case stands for itself. Raises UserError with
+    the nearest known name."""
     known = cases()
-    for name in names:
-        if name not in known:
-            raise UserError(f"no case named {quoted(name)}{suggestion(name, known)}")
-    return [known[name] for name in names] if names else list(known.values())
+    found = [name if isinstance(name, Case) else _named(str(name), known) for name in names]
+    return found if names else list(known.values())
 
 
-def scenario(name: str, **table: Any) -> Scenario:
-    """A case's scenario from keyword tables, validated like any other."""
-    from ..library import validate
+def _named(name: str, known: Mapping[str, Case]) -> Case:
+    if name in known:
+        return known[name]
+    if name.endswith(".py"):
+        return case_in(Path(name))
+    raise UserError(f"no case named {quoted(name)}{suggestion(name, known)}")
 
-    return validate({"name": name, **table}, f"case {name}")
+
+def case_in(path: Path) -> Case:
+    """The CASE that a Python file of the user's defines; raises UserError where there is none."""
+    shown = quoted(str(path))[1:-1]
+    try:
+        path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise UserError(f"{shown}: no such case: {getattr(error, 'strerror', None) or error}") from None
+    try:
+        found = runpy.run_path(str(path))
+    except Exception as error:
+        raise UserError(f"{shown}: it cannot be run: {type(error).__name__}: {error}") from None
+    if not isinstance(found.get("CASE"), Case):
+        raise UserError(f"{shown}: it defines no CASE (a fluidbench.study.case.Case)")
+    return found["CASE"]

@@ -1,30 +1,104 @@
-"""`compare`: one scenario through several methods, fidelity beside cost."""
+"""`compare` and `run`: one scenario through several methods, or one; fidelity beside cost."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Unpack
 
-from ..job import Job
+from ..errors import UserError
+from ..method.suitability import check_backend
+from ..method.target import DEFAULT_BACKEND, Target
+from ..method.verdict import lacking
+from ..registry import get_method
+from ..report.report import Report
+from ..runs.job import CHECKPOINTS, Job
+from ..runs.record import Record, Run
 from ..scenario import Scenario
-from ..solver import check_backend, configure, get_solver
-from ..target import Target
-from .execute import Finished
+from ..scenario.numerics import configure
+from .result import Result
+from .workplace import Options, Workplace, as_scenario, methods_of, targets_of
 
-if TYPE_CHECKING:
-    import pandas as pd
+WALL_LIMIT = 900.0  # s
+LENGTHS = ("bead_width_m", "bead_height_m", "bead_area_m2", "slump", "spread_radius_m", "front_x_m", "height_m")
+
+
+@dataclass(repr=False)
+class Comparison(Result):
+    """Runs of one scenario, in `runs`; `table` has a row for each."""
+
+
+def compare(
+    scenario: Scenario | str | Path,
+    methods: Sequence[str] | None = None,
+    *,
+    repeats: int = 1,
+    backends: Sequence[str] | None = None,
+    quick: bool = False,
+    frames: bool = False,
+    render_every: float | None = None,
+    checkpoint_every: float = CHECKPOINTS,
+    verb: str = "compare",
+    **options: Unpack[Options],
+) -> Comparison:
+    """Run one scenario through several methods and put fidelity and cost side by side.
+
+    `scenario` is one, or the name of a shipped one (`quick`: its shorter version), or a TOML file. `methods`: their
+    names; default all. `repeats`: runs of each, for the spread of its cost. `backends`: several languages instead of
+    one. `frames` keeps a snapshot of every output, `render_every` [simulated s] draws pictures beside the run,
+    `checkpoint_every` [wall s] is what a killed run loses at most (0: everything). `verb` names what is written.
+    `options` are those of every verb, see Options.
+
+    Raises UserError for what cannot be run, before anything is.
+    """
+    resolved, names = as_scenario(scenario, quick), methods_of(methods, options, backends)
+    languages, threads = list(backends or [options.get("backend", DEFAULT_BACKEND)]), options.get("threads", 1)
+    one = threads if len(languages) == 1 else 1
+    place = Workplace.of({**options, "backend": languages[0], "threads": one}, WALL_LIMIT, names)
+    targets = targets_of(place.target.device, languages, threads)
+    planned = jobs(
+        resolved,
+        names,
+        repeats,
+        targets,
+        wall_limit=place.wall_limit,
+        keep_frames=frames,
+        film_every=render_every,
+        checkpoint_every=checkpoint_every,
+    )
+    runs = [replace(run, keeper=place.keeper) for run in place.run(planned, verb)]
+    ok = any(run.ok for run in runs) and not lacking(runs, refusals=False)
+    return Comparison(report_of(runs, place.store.root, verb), place.store.root, runs, ok=ok, keeper=place.keeper)
+
+
+def run(scenario: Scenario | str | Path, method: str, **more: Any) -> Run:
+    """Run one `scenario` through one `method`, by name; `more` are the arguments of `compare`, times in [s].
+
+    However the run ends, its record says so; `record.measures`, `series` and `frame()` are what it left, in SI units.
+
+    Raises UserError for what cannot be run, before anything is.
+    """
+    return compare(scenario, [method], **more).runs[0]
+
+
+def report_of(runs: Sequence[Run], root: Path, verb: str) -> Report:
+    from .compare_report import report
+
+    return report(runs, root, verb)
 
 
 def jobs(
     scenario: Scenario, methods: Sequence[str], repeats: int, targets: Sequence[Target], **watched: Any
 ) -> list[Job]:
-    """All runs of a comparison, `watched` as a Job says; raises UserError for an unknown method or setting, and for a
-    scenario that this machine cannot hold, before anything has run."""
+    """All runs of a comparison, `watched` as a Job says; raises UserError for an unknown method or setting."""
+    if repeats < 1:
+        raise UserError(f"repeats: at least 1 is wanted (got {repeats})")
     for name in methods:
-        configure(get_solver(name), scenario)
+        configure(get_method(name), scenario)
         for target in targets:
-            check_backend(get_solver(name), target)
+            check_backend(get_method(name), target)
     table = scenario.model_dump(mode="json")
     return [
         Job(table, name, target, repeat, **watched)
@@ -34,36 +108,8 @@ def jobs(
     ]
 
 
-def tidy(results: Sequence[Finished]) -> pd.DataFrame:
-    """One row a run: what it was, how it ended, what it measured, how far off it was and what it cost."""
-    import pandas as pd
-
-    rows = []
-    for result in results:
-        record = result.record
-        row = {
-            k: record.get(k)
-            for k in ("scenario", "method", "device", "backend", "threads", "repeat", "seed", "spacing_m")
-        }
-        row |= {"verdict": result.verdict, "reason": result.reason, "reused": result.reused}
-        row |= {"print": record.get("print", "")} | record.get("measures", {})
-        row |= {f"error: {a['quantity']}": a["error"] for a in record.get("answers", [])}
-        row |= record.get("cost", {})
-        row["binding_bound"] = binding(record)
-        row |= {f"machine_{k}": v for k, v in record.get("machine", {}).items()}
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def lengths_of(record: dict[str, Any]) -> dict[str, float]:
+def lengths_of(record: Record) -> dict[str, float]:
     """The lengths, areas and slumps of a finished run: what a printer cares about."""
-    wanted = ("bead_width_m", "bead_height_m", "bead_area_m2", "slump", "spread_radius_m", "front_x_m", "height_m")
-    measures = record.get("measures", {})
-    layers = [key for key in measures if key.startswith("layer_") and key.endswith(("height_m", "width_m", "radius_m"))]
-    return {key: float(measures[key]) for key in (*wanted, *layers) if math.isfinite(measures.get(key, math.nan))}
-
-
-def binding(record: dict[str, Any]) -> str:
-    """The bound that held the step back for most of the simulated time."""
-    held = record.get("binding_s") or {}
-    return max(held, key=held.__getitem__) if held else ""
+    found = record.measures
+    layers = [key for key in found if key.startswith("layer_") and key.endswith(("height_m", "width_m", "radius_m"))]
+    return {key: found[key] for key in (*LENGTHS, *layers) if math.isfinite(found.get(key, math.nan))}

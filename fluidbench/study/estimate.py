@@ -3,33 +3,38 @@
 from dataclasses import dataclass
 from typing import Any
 
-from ..layout import capacity_of
+from ..method.contract import Method
+from ..method.suitability import Demands, approximations, refusal
+from ..method.timestep import Bound, Plan, plan
+from ..runs.needs import memory_needed
 from ..scenario import Scenario
-from ..solver import Demands, Solver, approximations, configure, refusal
-from ..timestep import Bound, Plan, plan
+from ..scenario.layout import capacity_of
+from ..scenario.numerics import configure
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Expected needs of one method on one scenario; time is for one CPU core and good to a factor of two."""
+    """Expected needs of one method on one scenario; time is for one CPU core and good to a factor of two. A method that
+    picks its own step has no plan, and nothing that follows from one."""
 
     method: str
     refusal: str | None
     approximations: list[str]
     bounds: list[Bound]
-    plan: Plan
+    plan: Plan | None
     particles: int
-    substeps: int
+    substeps: int | None
     memory_bytes: float
-    wall_s: float
+    wall_s: float | None
 
 
-def estimate(scenario: Scenario, solver: type[Solver]) -> Estimate:
+def estimate(scenario: Scenario, solver: type[Method]) -> Estimate:
     """Bounds at the scenario's reference speed, and what follows from them."""
     config: Any = configure(solver, scenario)
     tick, ticks, _ = scenario.schedule
     bounds = solver.bounds(Demands(solver, scenario, config).worst(), config, scenario.reference_speed)
-    steps = plan(bounds, tick)
+    steps = plan(bounds, tick) if bounds else None
+    substeps = None if steps is None else steps.substeps * ticks
     particles = capacity_of(scenario)
     filling = min(scenario.track.end / scenario.duration, 1.0) if scenario.track is not None else 0.0
     mean = particles * (1.0 - 0.5 * filling)
@@ -40,7 +45,7 @@ def estimate(scenario: Scenario, solver: type[Solver]) -> Estimate:
         bounds=bounds,
         plan=steps,
         particles=particles,
-        substeps=steps.substeps * ticks,
-        memory_bytes=particles * solver.typical_bytes,
-        wall_s=steps.substeps * ticks * mean / solver.typical_rate,
+        substeps=substeps,
+        memory_bytes=memory_needed(scenario, solver),
+        wall_s=None if substeps is None else substeps * mean / solver.typical_rate,
     )

@@ -1,6 +1,6 @@
 """Largest stable time steps by bisection: blocks of material at rest, and a lump thrown at the floor.
 
-The block follows validation H: at rest but for small random velocities, it is stable while its kinetic energy grows
+The block follows references.md, H: at rest but for small random velocities, it is stable while its kinetic energy grows
 less than a hundredfold in 500 steps. The lump meets free surfaces, contact and flow; it is stable while the health
 check finds nothing wrong.
 """
@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from ..body import Body
+from ..errors import UserError
+from ..method.contract import Method
+from ..method.target import Target
+from ..method.timestep import SPEED_MARGIN
 from ..scenario import Scenario
-from ..simulation import SPEED_MARGIN, Simulation
-from ..solver import Solver
-from ..target import Target
+from ..scenario.body import Body
 
 GROWTH, STEPS, LOOKS = (
     100.0,
@@ -73,29 +74,34 @@ def block(material: dict[str, Any], spacing: float) -> Scenario:
     """A periodic block at rest without gravity."""
     edge = CELLS * spacing
     walls = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
-    return Scenario.model_validate({
-        "name": "block", "domain": {"lower": (0, 0, 0), "upper": (edge,) * 3, "walls": walls}, "material": material,
-        "gravity": (0, 0, 0), "bodies": [{"kind": "box", "center": (edge / 2,) * 3, "size": (edge,) * 3}],
-        "duration": 1.0, "spacing": spacing,
-    })  # fmt: skip
+    return Scenario.model_validate(
+        {
+            "name": "block",
+            "domain": {"lower": (0, 0, 0), "upper": (edge,) * 3, "walls": walls},
+            "material": material,
+            "gravity": (0, 0, 0),
+            "bodies": [{"kind": "box", "center": (edge / 2,) * 3, "size": (edge,) * 3}],
+            "duration": 1.0,
+            "spacing": spacing,
+        }
+    )
 
 
 def block_limit(
-    scenario: Scenario, method: type[Solver], config: Any, guess: float, precision: float, target: Target
+    scenario: Scenario, method: type[Method], config: Any, guess: float, precision: float, target: Target
 ) -> Limit:
     """The largest stable dt of a block, with tension allowed: theory knows no cavitation."""
 
     def survives(dt: float) -> bool:
-        sim = Simulation(scenario, method, target, config=config)
-        sim.scene.allow_tension()
+        sim = method.start(scenario, config, target)
+        sim.allow_tension()
         rng = np.random.default_rng(0)
-        kick = AMPLITUDE * scenario.wave_speed * rng.uniform(-1, 1, (sim.pool.size, 3))
-        sim.pool.velocity.assign(kick.astype(np.float32))
+        sim.kick(AMPLITUDE * scenario.wave_speed * rng.uniform(-1, 1, (sim.capacity, 3)))
         start = sim.look().kinetic
         for _ in range(STEPS // LOOKS):
             sim.march(dt, LOOKS)
-            energy = sim.look().kinetic
-            if sim.health.broken() or not energy < GROWTH * start:
+            vital = sim.look()
+            if vital.broken or not vital.kinetic < GROWTH * start:
                 return False
         return True
 
@@ -107,13 +113,22 @@ def lump(scenario: Scenario, dt: float) -> Scenario:
     d, floor = scenario.spacing, scenario.domain.lower[2]
     edge, room = LUMP * d, 3 * LUMP * d
     middle = (room / 2, room / 2, floor + edge / 2 + d / 4)
-    return scenario.model_copy(update={
-        "name": "lump", "nozzle": None, "toolpath": None, "reference": None, "output_interval": None,
-        "domain": scenario.domain.model_copy(update={"lower": (0.0, 0.0, floor), "upper": (room, room, floor + room)}),
-        "material": scenario.material.model_copy(update=_own_sound(scenario)),
-        "bodies": (_box(middle, edge, scenario.reference_speed),),
-        "duration": LUMP_STEPS * dt, "tick": LOOKS * dt,
-    })  # fmt: skip
+    return scenario.model_copy(
+        update={
+            "name": "lump",
+            "nozzle": None,
+            "toolpath": None,
+            "reference": None,
+            "output_interval": None,
+            "domain": scenario.domain.model_copy(
+                update={"lower": (0.0, 0.0, floor), "upper": (room, room, floor + room)}
+            ),
+            "material": scenario.material.model_copy(update=_own_sound(scenario)),
+            "bodies": (_box(middle, edge, scenario.reference_speed),),
+            "duration": LUMP_STEPS * dt,
+            "tick": LOOKS * dt,
+        }
+    )
 
 
 def _own_sound(scenario: Scenario) -> dict[str, Any]:
@@ -129,20 +144,22 @@ def _box(center: tuple[float, float, float], edge: float, speed: float) -> Body:
     )
 
 
-def lump_survives(scenario: Scenario, method: type[Solver], config: Any, dt: float, target: Target) -> str | None:
+def lump_survives(scenario: Scenario, method: type[Method], config: Any, dt: float, target: Target) -> str | None:
     """None if the lump comes through at this dt [s], otherwise what went wrong."""
     thrown = Scenario.model_validate(lump(scenario, dt).model_dump())
-    sim = Simulation(thrown, method, target, config=config)
+    sim = method.start(thrown, config, target)
     for _ in range(LUMP_STEPS // LOOKS):
         sim.march(dt, LOOKS)
         vital = sim.look()
-        if vital.complaint or sim.fault():
-            return vital.complaint or sim.fault()
+        if vital.complaint or vital.shortage:
+            return vital.complaint or vital.shortage
     return None
 
 
-def default_dt(scenario: Scenario, method: type[Solver], config: Any) -> tuple[float, str]:
+def default_dt(scenario: Scenario, method: type[Method], config: Any) -> tuple[float, str]:
     """(dt [s], name of the bound) that the method would take for the lump."""
     bounds = method.bounds(scenario, config, SPEED_MARGIN * scenario.reference_speed)
+    if not bounds:
+        raise UserError(f"{method.name} picks its own step: it has no limit to look for")
     least = min(bounds, key=lambda b: b.dt)
     return least.dt, least.name

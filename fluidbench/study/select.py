@@ -17,19 +17,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, Unpack
 
 import numpy as np
 
-from ..job import Job
 from ..measure.reference import table as reference
+from ..method.verdict import lacking
+from ..runs.job import Job
+from ..runs.record import Run
 from ..scenario import Scenario
-from ..store import Store
-from ..target import Target
-from ..verdict import lacking
 from .compare import lengths_of
-from .execute import Finished, Hooks, execute
+from .result import Result
+from .workplace import Options, Workplace, as_scenario, methods_of
 
+WALL_LIMIT = 900.0  # s
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
 ENOUGH = 3  # spacings needed for an extrapolation
 NOISE = 0.01  # share of a length that its scatter may have without casting doubt on a fit
@@ -59,7 +61,7 @@ class Candidate:
     pace: float  # wall s per simulated s
     discretisation: float
     bias: float
-    run: Finished
+    run: Run
 
     @property
     def error(self) -> float:
@@ -73,7 +75,7 @@ class Selection:
     candidates: list[Candidate]
     trust: dict[str, Trust]
     limits: dict[str, dict[str, float]]
-    runs: list[Finished]
+    runs: list[Run]
     notes: list[str] = field(default_factory=list)
     erratic: set[str] = field(default_factory=set)  # methods with a length that no line through its spacings explains
 
@@ -142,17 +144,52 @@ def trust_of(scenario: Scenario, methods: Sequence[str]) -> dict[str, Trust]:
     return found
 
 
+@dataclass(repr=False)
+class Selected(Result):
+    """A recommendation with its evidence: `table` has a row for every candidate; `found` is all that it rests on."""
+
+    found: Selection = field(default_factory=lambda: Selection([], {}, {}, []))
+
+
 def select(
-    scenario: Scenario, methods: Sequence[str], store: Store, hooks: Hooks, target: Target, wall_limit: float
-) -> Selection:
-    """Run every method at every spacing, one at a time so that times mean something, and estimate all errors."""
-    jobs = []
-    for method in methods:
-        for factor in FACTORS:
-            table = scenario.model_dump(mode="json") | {"spacing": factor * scenario.spacing}
-            if _valid(table):
-                jobs.append(Job(table, method, target, wall_limit=wall_limit))
-    return assess(scenario, methods, execute(jobs, store, hooks))
+    scenario: Scenario | str | Path,
+    methods: Sequence[str] | None = None,
+    *,
+    tolerance: float = 0.05,
+    budget: float = math.inf,
+    pace: float = math.inf,
+    called: str = "",
+    **options: Unpack[Options],
+) -> Selected:
+    """Recommend a method, spacing and time step: least cost within a `tolerance` (largest relative error of any
+    length), within a `budget` of wall time [s] and a `pace` (wall s per simulated s), on this machine.
+
+    Runs every method at four spacings. `scenario` is one, a shipped name or a TOML file; `methods` are names, default
+    all. `called` is the scenario's name in the command that it recommends. `options` are those of every verb, see
+    Options.
+
+    Raises UserError for what cannot be run, before anything is.
+    """
+    from .select_report import report
+
+    resolved, names = as_scenario(scenario), methods_of(methods, options)
+    place = Workplace.of(options, WALL_LIMIT, names)
+    found = assess(resolved, names, place.run(candidates(resolved, names, place), "select"))
+    made = report(resolved, called or resolved.name, found, tolerance, budget, pace, place.store.root)
+    missing = found.missing()
+    ok = bool(found.candidates) and not missing
+    return Selected(made, place.store.root, found.runs, missing, ok, place.keeper, found)
+
+
+def candidates(scenario: Scenario, methods: Sequence[str], place: Workplace) -> list[Job]:
+    """Every method at every spacing that the scenario can have."""
+    tables = [scenario.model_dump(mode="json") | {"spacing": factor * scenario.spacing} for factor in FACTORS]
+    return [
+        Job(table, method, place.target, wall_limit=place.wall_limit)
+        for method in methods
+        for table in tables
+        if _valid(table)
+    ]
 
 
 def _valid(table: dict[str, Any]) -> bool:
@@ -165,12 +202,12 @@ def _valid(table: dict[str, Any]) -> bool:
     return True
 
 
-def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Finished]) -> Selection:
+def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> Selection:
     """Errors of all candidates from finished runs."""
     result = Selection([], trust_of(scenario, methods), {}, list(runs))
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
-        own = [r for r in runs if r.ok and r.record["method"] == method]
+        own = [r for r in runs if r.ok and r.method == method]
         if len(own) < ENOUGH:
             result.notes.append(f"{method}: only {len(own)} spacings completed, {ENOUGH} are needed")
             continue
@@ -186,8 +223,8 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Finished])
             f"the consensus is {trusted[0]}'s own limit: it has no second witness, and its bias is not known"
         )
     for run in runs:
-        if run.ok and run.record["method"] in fits:
-            result.candidates.append(_candidate(run, fits[run.record["method"]], consensus))
+        if run.ok and run.method in fits:
+            result.candidates.append(_candidate(run, fits[run.method], consensus))
     result.notes += [_unconverged(result, method) for method in fits if not result.converges(method)]
     return result
 
@@ -220,19 +257,19 @@ class Fit:
         return max(r for d, r in self.residual.items() if d <= spacing * (1 + 1e-9))
 
 
-def extrapolate(runs: Sequence[Finished], key: str) -> Fit:
+def extrapolate(runs: Sequence[Run], key: str) -> Fit:
     """First order in the spacing, weighted by its inverse."""
-    d = np.array([r.record["spacing_m"] for r in runs])
+    d = np.array([r.record.spacing_m for r in runs])
     q = np.array([lengths_of(r.record)[key] for r in runs])
     slope, limit = np.polyfit(d, q, 1, w=1.0 / d)
     residual = np.abs(q - (slope * d + limit))
     return Fit(float(limit), float(slope), dict(zip(d.tolist(), residual.tolist(), strict=True)))
 
 
-def exact_lengths(run: Finished) -> dict[str, float]:
+def exact_lengths(run: Run) -> dict[str, float]:
     """Lengths with an exact answer in a record."""
     names = {"bead area [m^2]": "bead_area_m2"}
-    return {names[a["quantity"]]: a["reference"] for a in run.record.get("answers", []) if a["quantity"] in names}
+    return {names[a.quantity]: a.reference for a in run.record.answers if a.quantity in names}
 
 
 def _consensus(result: Selection) -> dict[str, float]:
@@ -242,7 +279,7 @@ def _consensus(result: Selection) -> dict[str, float]:
     return {k: float(np.mean([result.limits[m][k] for m in voters if k in result.limits[m]])) for k in keys}
 
 
-def _candidate(run: Finished, fits: dict[str, Fit], consensus: dict[str, float]) -> Candidate:
+def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float]) -> Candidate:
     """The worst length decides."""
     record = run.record
     parts, exact = [(0.0, 0.0)], exact_lengths(run)
@@ -250,16 +287,22 @@ def _candidate(run: Finished, fits: dict[str, Fit], consensus: dict[str, float])
         if key in exact:
             parts.append((abs(value / exact[key] - 1.0), 0.0))
             continue
-        limit, scatter = fits[key].limit, fits[key].scatter(record["spacing_m"])
+        limit, scatter = fits[key].limit, fits[key].scatter(record.spacing_m)
         scale = abs(consensus.get(key, limit)) or 1.0
         bias = abs(limit - consensus.get(key, limit)) / scale
         parts.append((max(abs(value - limit), scatter) / scale, bias))
     discretisation, bias = max(parts, key=sum)
-    cost = record["cost"]
+    cost = run.cost
     return Candidate(
-        record["method"], record["spacing_m"], cost["mean_dt_s"], cost["wall_s"], cost["wall_per_simulated_s"],
-        discretisation, bias, run,
-    )  # fmt: skip
+        record.method,
+        record.spacing_m,
+        cost.mean_dt_s,
+        cost.wall_s,
+        cost.wall_per_simulated_s,
+        discretisation,
+        bias,
+        run,
+    )
 
 
 def confidence(result: Selection, tolerance: float) -> str:

@@ -4,29 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
-
-import numpy as np
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Unpack
 
 from ..errors import UserError, quoted, suggestion
-from ..library import validate
-from ..measure.reference import table as reference
+from ..method.suitability import refusal
+from ..method.target import Target
+from ..registry import get_method
+from ..runs.experiment import CRASH, Experiment
 from ..scenario import Scenario
-from ..solver import configure, get_solver, refusal
-from ..store import Store
-from ..target import Target
-from ..timestep import damped_limit
-from .experiments import CRASH, Task, run_tasks
+from ..scenario.library import validate
+from ..scenario.numerics import configure
+from .case import cases
+from .limits import block
+from .result import Result
+from .validate import plan, run
+from .workplace import Options, Workplace, as_scenario, methods_of
 
+Task = dict[str, Any]
+Runner = Callable[[Sequence[Experiment]], list[dict[str, Any]]]  # has experiments done, by whomever
+WALL_LIMIT = 1800.0  # s
 HELD, FAILED, REFUSED, ERROR = "held", "failed", "refused", "error"
 OPENING_STEPS = 2000  # substeps of the scenario itself, from its start, in a full study
 SPACINGS = (1 / 3, 0.5, 1.0, 2.0, 8 / 3)
-BARE = {
-    "sph": {"density_diffusion": 0.0, "density_feedback": 0.0, "artificial_viscosity": 0.0,
-            "artificial_viscosity_solid": 0.0, "artificial_stress": 0.0},
-}  # fmt: skip
-"""Settings that leave of a method what the theory knows of it."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Axis:
     values: tuple[float, ...]
     quick: tuple[float, ...]
     unit: str
+    power: float = 1.0
+    method: str | None = None  # that it is a matter of alone
 
     def setting(self, scenario: Scenario, value: float) -> dict[str, Any]:
         """Dotted keys of the scenario at a value."""
@@ -48,9 +51,9 @@ class Spacing(Axis):
         return {self.key: value * scenario.spacing}
 
 
-class ParticlesPerCell(Axis):
+class Own(Axis):
     def setting(self, scenario: Scenario, value: float) -> dict[str, Any]:
-        return {self.key: value ** (1 / 3)}
+        return {self.key: value**self.power}
 
 
 AXES = {
@@ -61,66 +64,116 @@ AXES = {
     "exit_speed": Axis("nozzle.exit_speed", (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0), (0.01, 0.3, 10.0), "m/s"),
     "density": Axis("material.density", (10.0, 100.0, 1e3, 3e3, 1e4), (10.0, 1e3, 1e4), "kg/m^3"),
     "spacing": Spacing("spacing", SPACINGS, (SPACINGS[0], 1.0, SPACINGS[-1]), "of the scenario's"),
-    "particles_per_cell": ParticlesPerCell("numerics.mpm.grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-"),
-}  # fmt: skip
+}
 
 
-def choose(names: Sequence[str]) -> dict[str, Axis]:
-    """The axes named, or all; raises UserError with the nearest known name."""
+@dataclass(repr=False)
+class StabilityMap(Result):
+    """Limits of the time step: `table` has a row for every point of every axis, and for every block of theory."""
+
+    points: list[dict[str, Any]] = field(default_factory=list)
+    blocks: list[dict[str, Any]] = field(default_factory=list)
+
+
+def stability(
+    scenario: Scenario | str | Path = "line_bead",
+    methods: Sequence[str] | None = None,
+    *,
+    axes: Sequence[str] = (),
+    quick: bool = False,
+    **options: Unpack[Options],
+) -> StabilityMap:
+    """Find the largest stable time step along material and numerical axes, beside each method's bound and theory.
+
+    `scenario` is one, a shipped name or a TOML file; `methods` are names, default all. `axes` are names (AXES, and
+    those of the methods' own numerics), values in the units that they have there; default all. `quick`: fewer points,
+    less precise. Steps are in [s]. `options` are those of every verb, see Options.
+
+    Raises UserError for what is not known, before anything is run.
+    """
+    from .stability_report import report
+
+    resolved, names = as_scenario(scenario), methods_of(methods, options)
+    chosen, place = choose(axes, names), Workplace.of(options, WALL_LIMIT, names)
+    blocks, points = block_tasks(names, quick, place.target), point_tasks(resolved, chosen, names, quick, place.target)
+    measured = measure_blocks(blocks, lambda work: place.run(work, "blocks", together=True))
+    rows = measure_points(points, lambda work: place.run(work, "points", together=True))
+    own = [case for case in cases().values() if case.about in names and place.target.device == "cpu"]
+    trials = [t for c in own for t in plan([c], [c.about], ["coarse"], False, place.target, place.wall_limit)]
+    if trials:
+        run(trials, place, "own numerics")
+    ok = all(row["verdict"] in (HELD, REFUSED) for row in rows) and not any("reason" in block for block in measured)
+    runs = [found for trial in trials for found in trial.runs.values()]
+    made = report(resolved, chosen, rows, measured, trials)
+    return StabilityMap(made, place.store.root, runs, ok=ok, keeper=place.keeper, points=rows, blocks=measured)
+
+
+def choose(names: Sequence[str], methods: Sequence[str]) -> dict[str, Axis]:
+    """The axes named, or all, those of the methods' own numerics included; raises UserError with the nearest known
+    name."""
+    known = dict(AXES)
+    for method in methods:
+        for axis in get_method(method).axes:
+            known[axis.name] = Own(
+                f"numerics.{method}.{axis.key}", axis.values, axis.quick, axis.unit, axis.power, method
+            )
     for name in names:
-        if name not in AXES:
-            raise UserError(f"no axis {quoted(name)}{suggestion(name, AXES)}")
-    return {name: AXES[name] for name in names or AXES}
+        if name not in known:
+            raise UserError(f"no axis {quoted(name)}{suggestion(name, known)}")
+    return {name: known[name] for name in names or known}
 
 
 def point_tasks(
     scenario: Scenario, axes: dict[str, Axis], methods: Sequence[str], quick: bool, target: Target
 ) -> list[tuple[str, Task]]:
-    """(label, task) of every point of every axis; particles per cell are a matter of MPM alone."""
+    """(label, task) of every point of every axis; a method's own axes are a matter of that method alone."""
     tasks = []
     for name, axis in axes.items():
-        for method in methods if name != "particles_per_cell" else [m for m in methods if m == "mpm"]:
+        for method in [m for m in methods if axis.method in (None, m)]:
             for value in axis.quick if quick else axis.values:
                 task = {
-                    "scenario": scenario.model_dump(mode="json"), "settings": axis.setting(scenario, value),
-                    "axis": name, "value": value, "method": method, "quick": quick, "target": asdict(target),
-                }  # fmt: skip
+                    "scenario": scenario.model_dump(mode="json"),
+                    "settings": axis.setting(scenario, value),
+                    "axis": name,
+                    "value": value,
+                    "method": method,
+                    "quick": quick,
+                    "target": asdict(target),
+                }
                 tasks.append((f"{name}-{method}", task))
     return tasks
 
 
-def measure_points(
-    tasks: Sequence[tuple[str, Task]], store: Store, workers: int, done: Callable[[int, dict[str, Any]], None]
-) -> list[dict[str, Any]]:
+def measure_points(tasks: Sequence[tuple[str, Task]], run: Runner) -> list[dict[str, Any]]:
     """A row a point, in order; one that could not be measured has the verdict `error` and says why."""
-
-    def row(i: int, result: dict[str, Any]) -> dict[str, Any]:
-        task = tasks[i][1]
-        if CRASH not in result:
-            return result
-        return {key: task[key] for key in ("axis", "value", "method")} | {"verdict": ERROR, "reason": result[CRASH]}
-
-    results = run_tasks(tasks, measure_point, store, workers, lambda i, r: done(i, row(i, r)))
-    return [row(i, result) for i, result in enumerate(results)]
+    results = run([_experiment("measure_point", label, task) for label, task in tasks])
+    return [
+        r
+        if CRASH not in r
+        else {key: t[key] for key in ("axis", "value", "method")} | {"verdict": ERROR, "reason": r[CRASH]}
+        for (_, t), r in zip(tasks, results, strict=True)
+    ]
 
 
-def measure_blocks(
-    tasks: Sequence[tuple[str, Task]], store: Store, workers: int, done: Callable[[int, dict[str, Any]], None]
-) -> list[dict[str, Any]]:
+def measure_blocks(tasks: Sequence[tuple[str, Task]], run: Runner) -> list[dict[str, Any]]:
     """A row a block, in order; one that could not be measured has a `reason` instead of limits."""
-    results = run_tasks(tasks, measure_block, store, workers, done)
+    results = run([_experiment("measure_block", label, task) for label, task in tasks])
     return [
         r if CRASH not in r else {"kind": t["kind"], "method": t["method"], "reason": r[CRASH]}
         for (_, t), r in zip(tasks, results, strict=True)
     ]
 
 
+def _experiment(function: str, label: str, task: Task) -> Experiment:
+    return Experiment(f"{__name__}:{function}", label, task["method"], task, Target(**task["target"]))
+
+
 def measure_point(task: Task) -> dict[str, Any]:
     """One point: do the defaults hold, and where are the limits of the resting block and of the thrown lump?"""
-    from .limits import Limit, bisect, block, block_limit, default_dt, lump_survives
+    from .limits import Limit, bisect, block_limit, default_dt, lump_survives
 
     row = {key: task[key] for key in ("axis", "value", "method")}
-    solver = get_solver(task["method"])
+    solver = get_method(task["method"])
     try:
         scenario = varied(task["scenario"], task["settings"])
         config = configure(solver, scenario)
@@ -129,16 +182,21 @@ def measure_point(task: Task) -> dict[str, Any]:
         return row | {"verdict": REFUSED, "reason": str(error).splitlines()[0]}
     if reason is not None:
         return row | {"verdict": REFUSED, "reason": reason}
+    if not solver.bounds(scenario, config, scenario.reference_speed):
+        return row | {"verdict": REFUSED, "reason": "it picks its own step"}
     target, precision = Target(**task["target"]), 0.2 if task["quick"] else 0.05
     own, binding = default_dt(scenario, solver, config)
     trouble = lump_survives(scenario, solver, config, own, target)
     if trouble is None and not task["quick"]:
         trouble = opening(scenario, task["method"], target)
     row |= {
-        "verdict": HELD if trouble is None else FAILED, "reason": trouble or "", "binding": binding, "dt_own_s": own,
-        "dt_theory_s": theory(task["method"], scenario, config),
-    }  # fmt: skip
-    if task["method"] == "pbd":  # no bound of stability: is it still sound far beyond its bound of accuracy?
+        "verdict": HELD if trouble is None else FAILED,
+        "reason": trouble or "",
+        "binding": binding,
+        "dt_own_s": own,
+        "dt_theory_s": solver.theory(scenario, config),
+    }
+    if not solver.bounded:  # is it still sound far beyond its bound of accuracy?
         beyond = lump_survives(scenario, solver, config, 8 * own, target) is None
         limit = Limit(8 * own, math.inf) if beyond else Limit(own, 8 * own)
     else:
@@ -150,7 +208,7 @@ def measure_point(task: Task) -> dict[str, Any]:
 
 def varied(table: dict[str, Any], settings: dict[str, Any]) -> Scenario:
     """A scenario with dotted keys changed; raises UserError where that makes no scenario."""
-    from ..library import assign
+    from ..scenario.library import assign
 
     changed = Scenario.model_validate(table).model_dump(mode="json", exclude_none=True)
     for key, value in settings.items():
@@ -175,82 +233,60 @@ def block_material(scenario: Scenario) -> dict[str, Any]:
 
 def opening(scenario: Scenario, method: str, target: Target) -> str | None:
     """None if the scenario's first steps go well, otherwise what went wrong."""
-    from ..simulation import Simulation
-
-    sim = Simulation(scenario, method, target)
+    solver = get_method(method)
+    session = solver.start(scenario, configure(solver, scenario), target)
+    tick, ticks, _ = scenario.schedule
     substeps = 0
-    while substeps < OPENING_STEPS and sim.done < sim.ticks:
-        substeps += sim.advance().substeps
-        if trouble := sim.look().complaint or sim.fault():
+    while substeps < OPENING_STEPS and session.now < tick * (ticks - 0.5):
+        substeps += session.advance(session.now + tick).substeps
+        vital = session.look()
+        if trouble := vital.complaint or vital.shortage:
             return trouble
     return None
-
-
-def theory(method: str, scenario: Scenario, config: Any) -> float | None:
-    """Largest stable dt [s] in bulk by the Fourier analyses of validation H, wave and viscous limits combined as for a
-    damped oscillator; None for a method that has no such limit.
-
-    The method's own bounds carry the wave speed and the viscosity (artificial included); only their numbers differ.
-    """
-    numbers = {"mpm": _mpm_numbers, "sph": _sph_numbers}.get(method)
-    if numbers is None:
-        return None
-    acoustic, viscous = numbers(scenario, config)
-    own = {b.name: b.dt for b in get_solver(method).bounds(scenario, config, 0.0)}
-    return damped_limit(own["acoustic"] * acoustic, own.get("viscous", math.inf) * viscous)
-
-
-def _mpm_numbers(scenario: Scenario, config: Any) -> tuple[float, float]:
-    """Bulk limits over the method's own, which are those of an isolated particle."""
-    rows = reference("mpm_stability_limits").set_index(["material", "arrangement", "gradient"])
-    bulk, alone = "3d bulk 8 per cell regular", "3d isolated particle"
-
-    def limit(material: str, arrangement: str) -> float:
-        row = rows.loc[(material, arrangement, "mls")]
-        return float(row["min"] + row["max"]) / 2
-
-    acoustic, viscous = (limit(m, bulk) / (config.safety * limit(m, alone)) for m in ("fluid", "viscous"))
-    return acoustic, viscous
-
-
-def _sph_numbers(scenario: Scenario, config: Any) -> tuple[float, float]:
-    rows = reference("sph_stability_limits")
-    rows = rows[rows["kernel"] == "wendland_c2"]
-    ratio = config.smoothing(scenario.material.youngs_modulus is not None)
-    acoustic, viscous = (float(np.interp(ratio, rows["h_over_dx"], rows[key])) for key in ("C_h", "D_monaghan"))
-    return acoustic / config.cfl, viscous / config.viscous_number
 
 
 BLOCKS = {
     "acoustic": {"density": 1000.0, "sound_speed": 10.0},
     "viscous": {"density": 1000.0, "sound_speed": 0.05, "viscosity": 100.0},
     "elastic": {"density": 1000.0, "youngs_modulus": 1e5},
-}  # fmt: skip
+}
 """Materials whose limit is known."""
 
 
 def block_tasks(methods: Sequence[str], quick: bool, target: Target) -> list[tuple[str, Task]]:
-    """The blocks of validation H, for methods that have a theory."""
+    """The blocks of references.md, H, for methods that have a theory."""
     return [
-        (f"block-{kind}-{method}", {"kind": kind, "method": method, "precision": 0.1 if quick else 0.03,
-                                    "target": asdict(target)})
-        for method in methods if method in ("mpm", "sph") for kind in BLOCKS
-    ]  # fmt: skip
+        (
+            f"block-{kind}-{method}",
+            {"kind": kind, "method": method, "precision": 0.1 if quick else 0.03, "target": asdict(target)},
+        )
+        for method in methods
+        if _has_theory(method)
+        for kind in BLOCKS
+    ]
+
+
+def _has_theory(name: str) -> bool:
+    method = get_method(name)
+    return method.theory(block(BLOCKS["acoustic"], 0.01), method.Config()) is not None
 
 
 def measure_block(task: Task) -> dict[str, Any]:
     """A block's limit against theory, the method stripped of what theory does not know."""
-    from .limits import block, block_limit, default_dt
+    from .limits import block_limit, default_dt
 
-    solver = get_solver(task["method"])
-    config = solver.Config(**BARE.get(task["method"], {}))
+    solver = get_method(task["method"])
+    config = solver.Config(**solver.bare)
     scenario = block(BLOCKS[task["kind"]], 0.01)
     own, _ = default_dt(scenario, solver, config)
     limit = block_limit(scenario, solver, config, own, task["precision"], Target(**task["target"]))
     return {
-        "kind": task["kind"], "method": task["method"], "dt_limit_s": limit.dt, "dt_own_s": own,
-        "dt_theory_s": theory(task["method"], scenario, config),
-    }  # fmt: skip
+        "kind": task["kind"],
+        "method": task["method"],
+        "dt_limit_s": limit.dt,
+        "dt_own_s": own,
+        "dt_theory_s": solver.theory(scenario, config),
+    }
 
 
 def findings(points: Sequence[dict[str, Any]], blocks: Sequence[dict[str, Any]]) -> list[str]:

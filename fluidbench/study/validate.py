@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-import json
 import math
-import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from ..errors import UserError, quoted, suggestion
-from ..job import Job
+from ..method.target import Target
+from ..method.verdict import Evidence, Verdict, evidence_of
+from ..registry import get_method
+from ..runs.job import Job
+from ..runs.record import Run
 from ..scenario import Scenario
-from ..solver import configure, get_solver
-from ..store import Store, write_atomically, write_parquet
-from ..target import Target
-from ..verdict import Evidence, Verdict, evidence_of
-from .case import METHOD_OF_LAW, Case, Finding, Run
-from .execute import Finished, Hooks, execute
+from ..scenario.numerics import configure
+from .case import METHOD_OF_LAW, Case, Finding, select
+from .result import Result
+from .workplace import Options, Workplace, methods_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
+WALL_LIMIT = 1800.0  # s
 LEVELS = {"rough": 1.5, "coarse": 1.0, "medium": 1 / 1.5, "fine": 0.5}  # factors on a case's coarse spacing
 PASS, MISS, EXEMPT, SKIPPED = "pass", "MISS", "exempt", "skipped"
 
@@ -43,7 +44,7 @@ class Trial:
     note: str = ""
     finding: Finding | None = None
     cost: dict[str, float] = field(default_factory=dict)
-    runs: dict[str, Finished] = field(default_factory=dict)
+    runs: dict[str, Run] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -75,10 +76,21 @@ class Trial:
         return self.case.limit(self.method, self.spacing / self.case.spacing)
 
 
+@dataclass(repr=False)
+class Validation(Result):
+    """Cases with known answers through methods: `table` has a row for each of `trials`."""
+
+    trials: list[Trial] = field(default_factory=list)
+
+
 def plan(
-    chosen: Sequence[Case], methods: Sequence[str], levels: Sequence[str], quick: bool, target: Target,
+    chosen: Sequence[Case],
+    methods: Sequence[str],
+    levels: Sequence[str],
+    quick: bool,
+    target: Target,
     wall_limit: float | None,
-) -> list[Trial]:  # fmt: skip
+) -> list[Trial]:
     """Every trial with its jobs; a method that is skipped has none and says why."""
     trials = []
     for case in chosen:
@@ -91,11 +103,11 @@ def plan(
                 continue
             assert case.scenarios is not None
             for method in methods:
-                if quick and (method in case.skipped or method in case.exempt):
+                if quick and (case.skips(method) or method in case.exempt):
                     continue
                 trial = Trial(case, method, level, spacing)
-                if method in case.skipped:
-                    trial.verdict, trial.note = SKIPPED, case.skipped[method]
+                if reason := case.skips(method):
+                    trial.verdict, trial.note = SKIPPED, reason
                 else:
                     trial.jobs = _jobs(case.scenarios(spacing), method, target, wall_limit)
                 trials.append(trial)
@@ -110,60 +122,88 @@ def _factor(level: str) -> float:
 
 def _jobs(scenarios: dict[str, Scenario], method: str, target: Target, wall_limit: float | None) -> dict[str, Job]:
     for scenario in scenarios.values():
-        configure(get_solver(method), scenario)
+        configure(get_method(method), scenario)
     return {
         label: Job(scenario.model_dump(mode="json"), method, target, wall_limit=wall_limit, keep_frames=True)
         for label, scenario in scenarios.items()
     }
 
 
-def run(
-    trials: Sequence[Trial], store: Store, workers: int, started: Callable[[int, Trial, bool], None],
-    progress: Callable[[int, dict], None], stopped: Callable[[int], None], ended: Callable[[Trial], None],
-) -> None:  # fmt: skip
-    """Run all jobs and evaluate each trial as soon as its last job has ended."""
-    flat = [(trial, label) for trial in trials for label in trial.jobs]
-    lock = threading.Lock()
+def validate(
+    cases: Sequence[str | Path | Case] | None = None,
+    methods: Sequence[str] | None = None,
+    *,
+    levels: Sequence[str] = ("coarse",),
+    quick: bool = False,
+    **options: Unpack[Options],
+) -> Validation:
+    """Run cases with known answers through every method: error, observed order and cost beside the tolerance.
 
-    def job_ended(i: int, finished: Finished) -> None:
-        trial, label = flat[i]
-        stopped(i)
-        with lock:
-            trial.runs[label] = finished
-            complete = len(trial.runs) == len(trial.jobs)
-        if complete:
-            evaluate(trial)
-            ended(trial)
+    `cases` are names of shipped ones, Python files that define CASE, or cases; default all. `levels` are spacings:
+    rough, coarse, medium, fine (1.5, 1, 2/3 and 1/2 of a case's own [m]). `methods`: their names; default all. `quick`:
+    a few minutes, every physics. `options` are those of every verb, see Options.
+
+    Raises UserError for what is not known, before anything is run.
+    """
+    names = methods_of(methods, options)
+    place = Workplace.of(options, WALL_LIMIT, names)
+    chosen = select(cases or [])
+    if cases and quick and (long := [case.name for case in chosen if case.quick is None]):
+        raise UserError(f"{', '.join(long)}: too dear to have a quick version; leave quick out")
+    trials = plan(chosen, names, levels, quick, place.target, place.wall_limit)
+    run(trials, place)
+    return result_of(trials, place)
+
+
+def result_of(trials: list[Trial], place: Workplace) -> Validation:
+    from .validate_report import report
+
+    root = place.store.root
+    runs = [found for t in trials for found in t.runs.values()]
+    ok = all(t.verdict in (PASS, EXEMPT, SKIPPED) for t in trials)
+    return Validation(report(trials, root), root, runs, ok=ok, keeper=place.keeper, trials=trials)
+
+
+def run(trials: Sequence[Trial], place: Workplace, title: str = "known answers") -> None:
+    """Run all jobs and evaluate each trial as soon as its last job has ended."""
+    from .validate_report import line
 
     for trial in trials:
-        if not trial.jobs:
-            if trial.case.drive is not None:
-                evaluate_law(trial)
-            ended(trial)
-    hooks = Hooks(lambda i, _job, reused: started(i, flat[i][0], reused), progress, job_ended)
-    execute([trial.jobs[label] for trial, label in flat], store, hooks, workers)
+        if trial.case.drive is not None:
+            evaluate_law(trial)
+    flat = [(trial, label) for trial in trials for label in trial.jobs]
+
+    def ended(i: int, finished: Run) -> str:
+        trial, label = flat[i]
+        trial.runs[label] = finished
+        if len(trial.runs) < len(trial.jobs):
+            return ""
+        evaluate(trial)
+        return line(trial)
+
+    place.run([trial.jobs[label] for trial, label in flat], title, together=True, line=ended)
 
 
 def evaluate(trial: Trial) -> None:
     """Judge a trial whose runs have all ended."""
-    records = [finished.record for finished in trial.runs.values()]
-    failed = [record for record in records if evidence_of(record["verdict"]) is not Evidence.RESULT]
-    costs = [record["cost"] for record in records if "cost" in record]
-    simulated = sum(cost["simulated_s"] for cost in costs)
+    runs = list(trial.runs.values())
+    failed = [run for run in runs if not run.ok]
+    costs = [run.record.cost for run in runs if run.record.cost is not None]
+    simulated = sum(cost.simulated_s for cost in costs)
     trial.cost = {
-        "particles": max((cost["peak_particles"] for cost in costs), default=0),
-        "substeps": sum(cost["substeps"] for cost in costs),
-        "wall_s": sum(cost["wall_s"] for cost in costs),
-        "cpu_s": sum(cost["cpu_s"] for cost in costs),
-        "wall_per_simulated_s": sum(cost["wall_s"] for cost in costs) / simulated if simulated else math.nan,
+        "particles": max((cost.peak_particles for cost in costs), default=0),
+        "substeps": sum(cost.substeps for cost in costs),
+        "wall_s": sum(cost.wall_s for cost in costs),
+        "cpu_s": sum(cost.cpu_s for cost in costs),
+        "wall_per_simulated_s": sum(cost.wall_s for cost in costs) / simulated if simulated else math.nan,
     }
     if failed:
-        first = min(failed, key=lambda record: evidence_of(record["verdict"]) is Evidence.INSTABILITY)
-        trial.verdict, trial.note = first["verdict"], first["reason"]
+        first = min(failed, key=lambda run: evidence_of(run.verdict) is Evidence.INSTABILITY)
+        trial.verdict, trial.note = first.verdict, first.reason
         return
     assert trial.case.evaluate is not None
     try:
-        trial.finding = trial.case.evaluate({label: Run(trial.runs[label]) for label in trial.jobs})
+        trial.finding = trial.case.evaluate({label: trial.runs[label] for label in trial.jobs})
     except Exception as error:  # one case's mistake must not end the others; it is shown as what it is
         trial.verdict, trial.note = Verdict.ERROR, f"its evaluation failed: {type(error).__name__}: {error}"
         return
@@ -210,20 +250,19 @@ def tidy(trials: Sequence[Trial]) -> pd.DataFrame:
     for t in trials:
         slope, spacings = slopes.get((t.case.name, t.method), (math.nan, 1))
         row = {
-            "case": t.case.name, "physics": t.case.physics, "method": t.method, "level": t.level,
-            "spacing_m": t.spacing, "error": t.error, "tolerance": t.tolerance, "measure": t.case.measure,
-            "order": slope, "order_spacings": spacings, "verdict": t.verdict, "note": t.note, "source": t.case.source,
-        }  # fmt: skip
+            "case": t.case.name,
+            "physics": t.case.physics,
+            "method": t.method,
+            "level": t.level,
+            "spacing_m": t.spacing,
+            "error": t.error,
+            "tolerance": t.tolerance,
+            "measure": t.case.measure,
+            "order": slope,
+            "order_spacings": spacings,
+            "verdict": t.verdict,
+            "note": t.note,
+            "source": t.case.source,
+        }
         rows.append(row | t.cost)
     return pd.DataFrame(rows)
-
-
-def write_results(trials: Sequence[Trial], root: Path) -> None:
-    """The table as parquet, and everything measured as JSON."""
-    table = tidy(trials)
-    write_parquet(root / "validate.parquet", table)
-    rows = json.loads(str(table.to_json(orient="records")))
-    for row, trial in zip(rows, trials, strict=True):
-        row["numbers"] = [asdict(n) for n in trial.finding.numbers] if trial.finding else []
-        row["runs"] = {label: r.folder.relative_to(root).as_posix() for label, r in trial.runs.items()}
-    write_atomically(root / "validate.json", json.dumps(rows, indent=1))

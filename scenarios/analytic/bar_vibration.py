@@ -4,7 +4,8 @@ import numpy as np
 
 from fluidbench.measure.profiles import period
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 LENGTH, YOUNG, POISSON = 0.5, 1e6, 0.3
 C = np.sqrt(YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON)) / 1000.0)
@@ -15,15 +16,21 @@ K = np.pi / (2 * LENGTH)
 def scenarios(spacing: float) -> dict[str, Scenario]:
     side = 4 * spacing
     body = {
-        "kind": "box", "center": [LENGTH / 2, side / 2, side / 2], "size": [LENGTH, side, side],
+        "kind": "box",
+        "center": [LENGTH / 2, side / 2, side / 2],
+        "size": [LENGTH, side, side],
         "wave": {"amplitude": [SPEED, 0, 0], "number": [K, 0, 0], "phase": K * LENGTH / 2},
-    }  # fmt: skip
-    bar = scenario(
-        "bar_vibration", domain={"lower": [0, 0, 0], "upper": [LENGTH + 10 * spacing, side, side],
-                                 "walls": {"z_lower": "slip"}}, bodies=[body],
-        material={"density": 1000.0, "youngs_modulus": YOUNG, "poisson_ratio": POISSON}, gravity=[0.0, 0.0, 0.0],
-        duration=PERIODS * PERIOD, output_interval=PERIOD / 24, spacing=spacing,
-    )  # fmt: skip
+    }
+    bar = define(
+        "bar_vibration",
+        domain={"lower": [0, 0, 0], "upper": [LENGTH + 10 * spacing, side, side], "walls": {"z_lower": "slip"}},
+        bodies=[body],
+        material={"density": 1000.0, "youngs_modulus": YOUNG, "poisson_ratio": POISSON},
+        gravity=[0.0, 0.0, 0.0],
+        duration=PERIODS * PERIOD,
+        output_interval=PERIOD / 24,
+        spacing=spacing,
+    )
     return {"bar": bar}
 
 
@@ -35,17 +42,26 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     seen = period(run.times, swing)
     left = float(np.abs(swing[-24:]).max())
     numbers = (
-        Number("period [s]", seen, PERIOD), Number("amplitude left after five periods", left, 1.0),
+        Number("period [s]", seen, PERIOD),
+        Number("amplitude left after five periods", left, 1.0),
         Number("numerical viscosity over c L", -2 * np.log(left) / (K**2 * PERIODS * PERIOD * C * LENGTH), 0.0),
-    )  # fmt: skip
+    )
     exact = np.cos(2 * np.pi * run.times / PERIOD)
     curve = Curve("mode", "time [s]", "modal velocity / V0", run.times, swing, run.times, exact)
     return Finding(abs(seen / PERIOD - 1.0), numbers, (curve,))
 
 
 CASE = Case(
-    "bar_vibration", "a bar swinging along its axis", "elastic", "exact; d'Alembert, validation E",
-    "relative error of the period 4 L / c", spacing=LENGTH / 50, tolerance=0.01, fine_tolerance=0.005,
-    scenarios=scenarios, evaluate=evaluate, quick=LENGTH / 50,
+    "bar_vibration",
+    "a bar swinging along its axis",
+    "elastic",
+    "exact; d'Alembert, references.md, E",
+    "relative error of the period 4 L / c",
+    spacing=LENGTH / 50,
+    tolerance=0.01,
+    fine_tolerance=0.005,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=LENGTH / 50,
     exempt={"pbd": "bonds are central forces (Poisson ratio 1/4) and sweeps convey part of their stiffness"},
-)  # fmt: skip
+)

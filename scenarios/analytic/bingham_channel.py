@@ -4,7 +4,8 @@ import numpy as np
 
 from fluidbench.measure.profiles import relative_l2
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 HALF, DRIVE, MU = 0.01, 1e4, 2.0  # half width [m], force per volume [N/m^3], plastic viscosity [Pa s]
 YIELD = 0.4 * DRIVE * HALF
@@ -14,14 +15,27 @@ PLUG = (DRIVE * HALF - YIELD) ** 2 / (2 * MU * DRIVE)
 def scenarios(spacing: float) -> dict[str, Scenario]:
     side = 8 * spacing
     walls = {f"{axis}_{end}": "periodic" for axis in "xz" for end in ("lower", "upper")}
-    channel = scenario(
-        "bingham_channel", domain={"lower": [0, 0, 0], "upper": [side, HALF, side],
-                                   "walls": {**walls, "y_lower": "stick", "y_upper": "slip"}},
-        material={"density": 1000.0, "sound_speed": 5.0, "youngs_modulus": 120 * YIELD, "poisson_ratio": 0.45,
-                  "yield_stress": YIELD, "plastic_viscosity": MU},
+    channel = define(
+        "bingham_channel",
+        domain={
+            "lower": [0, 0, 0],
+            "upper": [side, HALF, side],
+            "walls": {**walls, "y_lower": "stick", "y_upper": "slip"},
+        },
+        material={
+            "density": 1000.0,
+            "sound_speed": 5.0,
+            "youngs_modulus": 120 * YIELD,
+            "poisson_ratio": 0.45,
+            "yield_stress": YIELD,
+            "plastic_viscosity": MU,
+        },
         bodies=[{"kind": "box", "center": [side / 2, HALF / 2, side / 2], "size": [side, HALF, side]}],
-        gravity=[0.0, 0.0, 0.0], body_force=[DRIVE / 1000.0, 0.0, 0.0], duration=0.4, spacing=spacing,
-    )  # fmt: skip
+        gravity=[0.0, 0.0, 0.0],
+        body_force=[DRIVE / 1000.0, 0.0, 0.0],
+        duration=0.4,
+        spacing=spacing,
+    )
     return {"channel": channel}
 
 
@@ -49,11 +63,19 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "bingham_channel", "plug flow of a Bingham paste between plates", "yield stress", "exact; Bingham, validation D",
-    "E2 of velocity", spacing=HALF / 16, tolerance=0.05, fine_tolerance=0.03, scenarios=scenarios, evaluate=evaluate,
+    "bingham_channel",
+    "plug flow of a Bingham paste between plates",
+    "yield stress",
+    "exact; references.md, D",
+    "E2 of velocity",
+    spacing=HALF / 16,
+    tolerance=0.05,
+    fine_tolerance=0.03,
+    scenarios=scenarios,
+    evaluate=evaluate,
     quick=HALF / 16,
     causes={
         "sph": "slip at the wall, not understood: rows slide past their images, and finer spacings do not cure it",
     },
     exempt={"pbd": "shear stiffness is limited by the time step"},
-)  # fmt: skip
+)

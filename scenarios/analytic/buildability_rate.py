@@ -8,7 +8,8 @@ import math
 import numpy as np
 
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 RADIUS, WEIGHT, RISE = 0.01, 9810.0, 0.05  # m, rho g [N/m^3], vertical building rate w [m/s]
 YIELD, YOUNG, POISSON, TIME = 183.0, 7e4, 0.45, 1.4  # Pa, Pa, -, s
@@ -20,22 +21,36 @@ def scenarios(spacing: float) -> dict[str, Scenario]:
     thick = 2 * spacing
     layers = math.ceil(TIME * RISE / thick)
     column = [
-        {"kind": "cylinder", "center": [0, 0, (k + 0.5) * thick], "radius": RADIUS, "height": thick,
-         "start": k * thick / RISE}
+        {
+            "kind": "cylinder",
+            "center": [0, 0, (k + 0.5) * thick],
+            "radius": RADIUS,
+            "height": thick,
+            "start": k * thick / RISE,
+        }
         for k in range(layers)
-    ]  # fmt: skip
+    ]
     return {
-        label: scenario(
+        label: define(
             f"buildability_{label}",
             domain={"lower": [0, 0, 0], "upper": [0.03, 0.03, 0.085], "walls": {"z_lower": "slip"}},
-            material={"density": 1000.0, "sound_speed": 10.0, "youngs_modulus": YOUNG, "poisson_ratio": POISSON,
-                      "yield_stress": YIELD, "plastic_viscosity": 5.0,
-                      "cure": {"kind": "linear", "time": TIME, "yield_stress": YIELD + rate * TIME}},
-            bodies=column, duration=TIME, output_interval=TIME / 70, spacing=spacing,
+            material={
+                "density": 1000.0,
+                "sound_speed": 10.0,
+                "youngs_modulus": YOUNG,
+                "poisson_ratio": POISSON,
+                "yield_stress": YIELD,
+                "plastic_viscosity": 5.0,
+                "cure": {"kind": "linear", "time": TIME, "yield_stress": YIELD + rate * TIME},
+            },
+            bodies=column,
+            duration=TIME,
+            output_interval=TIME / 70,
+            spacing=spacing,
             numerics={"mpm": {"grid_ratio": 1.5}},
         )
         for label, rate in RATES.items()
-    }  # fmt: skip
+    }
 
 
 def spread_of(run: Run) -> np.ndarray:
@@ -65,9 +80,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "buildability_rate", "how high a column can be built before its foot yields", "process",
-    "first yield at sqrt(3) tau_0 / (rho g w - sqrt(3) A_thix), or never; Roussel 2018, validation D",
+    "buildability_rate",
+    "how high a column can be built before its foot yields",
+    "process",
+    "first yield at sqrt(3) tau_0 / (rho g w - sqrt(3) A_thix), or never; Roussel 2018, references.md, D",
     "(|H / H_ref - 1| beyond one layer); infinite if the strong column yields",
-    spacing=RADIUS / 8, tolerance=0.10, scenarios=scenarios, evaluate=evaluate, quick=RADIUS / 6,
+    spacing=RADIUS / 8,
+    tolerance=0.10,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=RADIUS / 6,
     exempt={"pbd": "shear stiffness is limited by the time step"},
-)  # fmt: skip
+)

@@ -5,7 +5,8 @@ import numpy as np
 from fluidbench.measure.profiles import damped_swing
 from fluidbench.measure.reference import table
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 LENGTH, SIDE, YOUNG, POISSON = 0.1, 0.02, 3.68e5, 0.3
 STIFFNESS = 12 * 1000.0 * 9.81 * LENGTH**3 / (YOUNG * SIDE**2)  # G = 0.8
@@ -24,12 +25,16 @@ def scenarios(spacing: float) -> dict[str, Scenario]:
             "clamped": clamped,
         }
 
-    beam = scenario(
-        "cantilever_sag", domain={"lower": [-0.03, -0.03, 0], "upper": [0.12, 0.03, 0.08]},
+    beam = define(
+        "cantilever_sag",
+        domain={"lower": [-0.03, -0.03, 0], "upper": [0.12, 0.03, 0.08]},
         material={"density": 1000.0, "youngs_modulus": YOUNG, "poisson_ratio": POISSON},
-        bodies=[part(-depth, depth, True), part(0.0, LENGTH, False)], duration=3 * PERIOD, output_interval=PERIOD / 24,
-        spacing=spacing, numerics={"mpm": {"grid_ratio": 1.5}},
-    )  # fmt: skip
+        bodies=[part(-depth, depth, True), part(0.0, LENGTH, False)],
+        duration=3 * PERIOD,
+        output_interval=PERIOD / 24,
+        spacing=spacing,
+        numerics={"mpm": {"grid_ratio": 1.5}},
+    )
     return {"beam": beam}
 
 
@@ -53,11 +58,18 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "cantilever_sag", "a clamped beam bending under its own weight", "elastic",
-    "elastica (cantilever_self_weight_elastica.csv) with Timoshenko's shear term; validation E",
+    "cantilever_sag",
+    "a clamped beam bending under its own weight",
+    "elastic",
+    "elastica (cantilever_self_weight_elastica.csv) with Timoshenko's shear term; references.md, E",
     "relative error of the tip sag at rest, from a fit of the damped swing",
-    spacing=SIDE / 8, tolerance=0.05, fine_tolerance=0.02, scenarios=scenarios,
+    spacing=SIDE / 8,
+    tolerance=0.05,
+    fine_tolerance=0.02,
+    scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "bending is the slowest mode of a relaxation: it would take some (L / d)^2 sweeps a substep",
-            "sph": "too soft: strain next to a free face is seen further in, and the beam is 8 particles thick"},
-)  # fmt: skip
+    exempt={
+        "pbd": "bending is the slowest mode of a relaxation: it would take some (L / d)^2 sweeps a substep",
+        "sph": "too soft: strain next to a free face is seen further in, and the beam is 8 particles thick",
+    },
+)

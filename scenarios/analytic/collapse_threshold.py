@@ -28,9 +28,10 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     slump = np.array([late(runs[f"{tau}"]) for tau in STRESSES]) - settled
     seen = float(np.interp(-CRITERION, -slump, STRESSES))
     numbers = (
-        Number("tau' at s' = 0.02", seen, WANTED), Number("settlement of the unyielding column", settled, 0.0),
+        Number("tau' at s' = 0.02", seen, WANTED),
+        Number("settlement of the unyielding column", settled, 0.0),
         *(Number(f"slump at tau' = {t}, settlement taken off", s, 0.0) for t, s in zip(STRESSES, slump, strict=True)),
-    )  # fmt: skip
+    )
     taus = np.linspace(STRESSES[0], STRESSES[-1], 40)
     x = np.minimum(np.sqrt(3.0) * taus, 1.0)
     curve = Curve("slump", "tau'", "slump s'", np.array(STRESSES), slump, taus, 1 - x * (1 - np.log(x)))
@@ -38,9 +39,16 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "collapse_threshold", "the yield stress below which a slender column flows", "yield stress",
-    "slender theory (von Mises); Roussel 2018, validation D", "|tau'_c / 0.466 - 1| at the criterion s' = 0.02",
-    spacing=HEIGHT / 24, tolerance=0.15, fine_tolerance=0.10, scenarios=scenarios, evaluate=evaluate,
+    "collapse_threshold",
+    "the yield stress below which a slender column flows",
+    "yield stress",
+    "slender theory (von Mises); Roussel 2018, references.md, D",
+    "|tau'_c / 0.466 - 1| at the criterion s' = 0.02",
+    spacing=HEIGHT / 24,
+    tolerance=0.15,
+    fine_tolerance=0.10,
+    scenarios=scenarios,
+    evaluate=evaluate,
     causes={"sph": "columns that should stand sink by 2 to 4 % as their foot splits into petals, as in slump_slip"},
     exempt={"pbd": "shear stiffness is limited by the time step"},
-)  # fmt: skip
+)

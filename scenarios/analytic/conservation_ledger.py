@@ -1,23 +1,32 @@
-"""A spinning, straining drop in free flight: mass, momentum and energy book-keeping (validation A, exact)."""
+"""A spinning, straining drop in free flight: mass, momentum and energy book-keeping (references.md, A, exact)."""
 
 import numpy as np
 
 from fluidbench.measure.profiles import kinetic_energy
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Finding, Number, Run
 
 G = np.array([0.0, 0.0, -9.81])
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
     body = {
-        "kind": "sphere", "center": [0.2, 0.2, 0.2], "radius": 0.05,
+        "kind": "sphere",
+        "center": [0.2, 0.2, 0.2],
+        "radius": 0.05,
         "velocity_gradient": [[5.0, -8.0, 0.0], [8.0, 5.0, 0.0], [0.0, 0.0, -10.0]],
-    }  # fmt: skip
-    drop = scenario(
-        "conservation_ledger", domain={"lower": [0, 0, 0], "upper": [0.4, 0.4, 0.4]}, material={"density": 1000.0},
-        gravity=G.tolist(), bodies=[body], duration=0.06, output_interval=0.01, spacing=spacing,
-    )  # fmt: skip
+    }
+    drop = define(
+        "conservation_ledger",
+        domain={"lower": [0, 0, 0], "upper": [0.4, 0.4, 0.4]},
+        material={"density": 1000.0},
+        gravity=G.tolist(),
+        bodies=[body],
+        duration=0.06,
+        output_interval=0.01,
+        spacing=spacing,
+    )
     return {"drop": drop}
 
 
@@ -42,7 +51,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "conservation_ledger", "a spinning, straining drop in free flight", "kinematics", "exact; validation A",
+    "conservation_ledger",
+    "a spinning, straining drop in free flight",
+    "kinematics",
+    "exact; references.md, A",
     "|P - P0 - M g t| / (M g t), plus any change of mass, plus growth of energy beyond 1 %",
-    spacing=0.01, tolerance=1e-4, scenarios=scenarios, evaluate=evaluate, quick=0.01,
-)  # fmt: skip
+    spacing=0.01,
+    tolerance=1e-4,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=0.01,
+)

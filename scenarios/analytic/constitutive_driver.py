@@ -49,7 +49,13 @@ def drive(dt: float) -> Finding:
 
 
 CASE = Case(
-    "constitutive_driver", "the material law on a single point", "viscoelastic", "exact; validation E",
-    "largest relative error of four stresses; `spacing` is dt [s]", spacing=1e-3, tolerance=0.02, drive=drive,
+    "constitutive_driver",
+    "the material law on a single point",
+    "viscoelastic",
+    "exact; references.md, E",
+    "largest relative error of four stresses; `spacing` is dt [s]",
+    spacing=1e-3,
+    tolerance=0.02,
+    drive=drive,
     quick=1e-3,
-)  # fmt: skip
+)

@@ -5,14 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fluidbench.cure import Cure
+from fluidbench.scenario.cure import Cure
 from fluidbench.study.case import Case, Curve, Finding, Number
 
 DELAY, K1, K2, N, END = 0.5, 0.8, 3.0, 2.5, 4.0
 RATES: dict[str, tuple[Cure, Callable[[float, float], float]]] = {
-    "first order": (
-        Cure(kind="first_order", delay=DELAY, rate=K1, youngs_modulus=1e5), lambda t, a: K1 * (1 - a)
-    ),
+    "first order": (Cure(kind="first_order", delay=DELAY, rate=K1, youngs_modulus=1e5), lambda t, a: K1 * (1 - a)),
     "Kamal-Sourour": (
         Cure(kind="kamal_sourour", delay=DELAY, rate=K1, rate_autocatalytic=K2, youngs_modulus=1e5),
         lambda t, a: (K1 + K2 * a) * (1 - a),
@@ -22,7 +20,7 @@ RATES: dict[str, tuple[Cure, Callable[[float, float], float]]] = {
         lambda t, a: N * K1 * (K1 * t) ** (N - 1) * (1 - a),
     ),
     "linear": (Cure(kind="linear", delay=DELAY, time=2 * END, youngs_modulus=1e5), lambda t, a: 0.5 / END),
-}  # fmt: skip
+}
 
 
 def integrated(rate: Callable[[float, float], float], dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +57,13 @@ def drive(dt: float) -> Finding:
 
 
 CASE = Case(
-    "cure_kinetics", "degree of cure by four laws", "process", "exact; validation G",
+    "cure_kinetics",
+    "degree of cure by four laws",
+    "process",
+    "exact; references.md, G",
     "largest departure of alpha and of the time to a target; `spacing` is dt [s] of the reference",
-    spacing=1e-2, tolerance=1e-4, drive=drive, quick=1e-2,
-)  # fmt: skip
+    spacing=1e-2,
+    tolerance=1e-4,
+    drive=drive,
+    quick=1e-2,
+)

@@ -1,7 +1,7 @@
 """A strip spreads on a no-slip floor while its viscosity grows without bound: cure decides the width of a bead.
 
 The strip is half as high as wide to its middle, as in viscous_release: lubrication theory is 15 to 20 % off, with and
-without cure, for one that is twice as high (validation F).
+without cure, for one that is twice as high (references.md, F).
 """
 
 import math
@@ -10,7 +10,8 @@ import numpy as np
 
 from fluidbench.measure.reference import table
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 HALF, HEIGHT, NU, G, TIME = 0.01, 0.005, 5e-4, 9.81, 0.6
 LATE = 3.0  # end of the run in time constants
@@ -20,16 +21,29 @@ UNIT = 3 * NU * HALF**2 / (G * HEIGHT**3)  # s at t* = 1 with the fresh viscosit
 def scenarios(spacing: float) -> dict[str, Scenario]:
     slab = 6 * spacing
     viscosity = 1000.0 * NU
-    strip = scenario(
+    strip = define(
         "curing_bead_arrest",
-        domain={"lower": [0, 0, 0], "upper": [0.024, slab, 0.00625],
-                "walls": {"z_lower": "stick", "y_lower": "periodic", "y_upper": "periodic"}},
-        material={"density": 1000.0, "viscosity": viscosity, "sound_speed": 2.3,
-                  "cure": {"kind": "linear", "time": LATE * TIME, "viscosity": viscosity * math.exp(LATE),
-                           "interpolation": "geometric"}},
+        domain={
+            "lower": [0, 0, 0],
+            "upper": [0.024, slab, 0.00625],
+            "walls": {"z_lower": "stick", "y_lower": "periodic", "y_upper": "periodic"},
+        },
+        material={
+            "density": 1000.0,
+            "viscosity": viscosity,
+            "sound_speed": 2.3,
+            "cure": {
+                "kind": "linear",
+                "time": LATE * TIME,
+                "viscosity": viscosity * math.exp(LATE),
+                "interpolation": "geometric",
+            },
+        },
         bodies=[{"kind": "box", "center": [0, slab / 2, HEIGHT / 2], "size": [2 * HALF, slab, HEIGHT]}],
-        duration=LATE * TIME, output_interval=TIME / 10, spacing=spacing,
-    )  # fmt: skip
+        duration=LATE * TIME,
+        output_interval=TIME / 10,
+        spacing=spacing,
+    )
     return {"strip": strip}
 
 
@@ -55,9 +69,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "curing_bead_arrest", "a strip that spreads until its cure stops it", "process",
-    "lubrication theory in s = integral nu0 / nu dt; Huppert 1982, validation F",
+    "curing_bead_arrest",
+    "a strip that spreads until its cure stops it",
+    "process",
+    "lubrication theory in s = integral nu0 / nu dt; Huppert 1982, references.md, F",
     "relative error of the final half width",
-    spacing=HEIGHT / 10, tolerance=0.08, scenarios=scenarios, evaluate=evaluate, quick=HEIGHT / 6,
+    spacing=HEIGHT / 10,
+    tolerance=0.08,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=HEIGHT / 6,
     exempt={"pbd": "velocity smoothing makes the viscosity depend on dt, and caps it"},
-)  # fmt: skip
+)

@@ -1,23 +1,28 @@
-"""A nozzle extruding without gravity, at rest and moving: mass rho Q t to one layer (validation A, exact)."""
+"""A nozzle extruding without gravity, at rest and moving: mass rho Q t to one layer (references.md, A, exact)."""
 
 import numpy as np
 
-from fluidbench.particles import CARRIED
+from fluidbench.method.frame import CARRIED
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Finding, Number, Run
 
 RADIUS, EXIT, TIME = 0.004, 0.1, 0.4
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
     def nozzle(speed: float, end: float) -> Scenario:
-        return scenario(
-            "emission_mass_rate", domain={"lower": [-0.01, -0.01, 0], "upper": [0.06, 0.01, 0.08]},
-            material={"density": 1000.0}, gravity=[0.0, 0.0, 0.0],
+        return define(
+            "emission_mass_rate",
+            domain={"lower": [-0.01, -0.01, 0], "upper": [0.06, 0.01, 0.08]},
+            material={"density": 1000.0},
+            gravity=[0.0, 0.0, 0.0],
             nozzle={"diameter": 2 * RADIUS, "exit_speed": EXIT, "standoff": 0.06},
             toolpath={"kind": "line", "start": [0.0, 0.0], "end": [end, 0.0], "speed": speed},
-            duration=TIME, output_interval=TIME / 8, spacing=spacing,
-        )  # fmt: skip
+            duration=TIME,
+            output_interval=TIME / 8,
+            spacing=spacing,
+        )
 
     return {"slow": nozzle(0.01, 0.01), "moving": nozzle(0.1, 0.05)}
 
@@ -51,7 +56,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "emission_mass_rate", "a nozzle extruding without gravity, slow and fast", "emission", "exact; validation A",
+    "emission_mass_rate",
+    "a nozzle extruding without gravity, slow and fast",
+    "emission",
+    "exact; references.md, A",
     "worst of |m - rho Q t| in layers, error of momentum over 1 %, approach of neighbours over 0.3 d",
-    spacing=RADIUS / 4, tolerance=1.0, scenarios=scenarios, evaluate=evaluate, quick=RADIUS / 4,
-)  # fmt: skip
+    spacing=RADIUS / 4,
+    tolerance=1.0,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=RADIUS / 4,
+)

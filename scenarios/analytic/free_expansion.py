@@ -6,7 +6,8 @@ import numpy as np
 
 from fluidbench.measure.profiles import semi_axes
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 RADIUS, TIME, RATIOS = 0.02, 1.0, (10.0, 30.0)
 
@@ -20,15 +21,28 @@ def scenarios(spacing: float) -> dict[str, Scenario]:
     for ratio in RATIOS:
         half = 1.4 * RADIUS * ratio ** (1 / 3)
         rate = (ratio - 1.0) / (3.0 * TIME)
-        found[f"R = {ratio:g}"] = scenario(
+        found[f"R = {ratio:g}"] = define(
             f"free_expansion_{ratio:g}",
             domain={"lower": [-half] * 3, "upper": [half] * 3, "walls": {"z_lower": "slip"}},
-            material={"density": 100.0, "youngs_modulus": 2e3, "yield_stress": 20.0,
-                      "expansion": {"ratio": ratio, "time": TIME}},
-            bodies=[{"kind": "sphere", "center": [0, 0, 0], "radius": RADIUS,
-                     "velocity_gradient": np.diag([rate] * 3).tolist()}],
-            gravity=[0, 0, 0], duration=2 * TIME, output_interval=TIME / 4, spacing=spacing,
-        )  # fmt: skip
+            material={
+                "density": 100.0,
+                "youngs_modulus": 2e3,
+                "yield_stress": 20.0,
+                "expansion": {"ratio": ratio, "time": TIME},
+            },
+            bodies=[
+                {
+                    "kind": "sphere",
+                    "center": [0, 0, 0],
+                    "radius": RADIUS,
+                    "velocity_gradient": np.diag([rate] * 3).tolist(),
+                }
+            ],
+            gravity=[0, 0, 0],
+            duration=2 * TIME,
+            output_interval=TIME / 4,
+            spacing=spacing,
+        )
     return found
 
 
@@ -53,9 +67,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "free_expansion", "a sphere of foam that expands tenfold and thirtyfold", "process",
-    "exact: lengths as R^(1/3); validation G",
+    "free_expansion",
+    "a sphere of foam that expands tenfold and thirtyfold",
+    "process",
+    "exact: lengths as R^(1/3); references.md, G",
     "largest relative error of volume and of roundness; infinite if mass moved",
-    spacing=RADIUS / 4, tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
+    spacing=RADIUS / 4,
+    tolerance=0.02,
+    scenarios=scenarios,
+    evaluate=evaluate,
     exempt={"pbd": "density constraints only push: the foam keeps the speed of its fastest growth and flies apart"},
-)  # fmt: skip
+)

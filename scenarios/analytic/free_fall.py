@@ -1,19 +1,26 @@
-"""A liquid sphere thrown upwards: time integration, no spurious self-force (validation A, exact)."""
+"""A liquid sphere thrown upwards: time integration, no spurious self-force (references.md, A, exact)."""
 
 import numpy as np
 
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Finding, Number, Run
 
 RADIUS, START, G = 0.05, np.array([1.0, 0.0, 2.0]), np.array([0.0, 0.0, -9.81])
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
     body = {"kind": "sphere", "center": [0.3, 0.3, 0.3], "radius": RADIUS, "velocity": START.tolist()}
-    flight = scenario(
-        "free_fall", domain={"lower": [0, 0, 0], "upper": [0.8, 0.6, 0.8]}, material={"density": 1000.0},
-        gravity=G.tolist(), bodies=[body], duration=0.3, output_interval=0.1, spacing=spacing,
-    )  # fmt: skip
+    flight = define(
+        "free_fall",
+        domain={"lower": [0, 0, 0], "upper": [0.8, 0.6, 0.8]},
+        material={"density": 1000.0},
+        gravity=G.tolist(),
+        bodies=[body],
+        duration=0.3,
+        output_interval=0.1,
+        spacing=spacing,
+    )
     return {"flight": flight}
 
 
@@ -36,7 +43,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "free_fall", "a liquid sphere in free flight", "kinematics", "exact; validation A",
+    "free_fall",
+    "a liquid sphere in free flight",
+    "kinematics",
+    "exact; references.md, A",
     "largest of |x - x_symplectic| / (g t^2 / 2) and change of shape / R",
-    spacing=RADIUS / 8, tolerance=5e-4, scenarios=scenarios, evaluate=evaluate, quick=RADIUS / 8,
-)  # fmt: skip
+    spacing=RADIUS / 8,
+    tolerance=5e-4,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=RADIUS / 8,
+)

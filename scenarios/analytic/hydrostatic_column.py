@@ -4,19 +4,23 @@ import numpy as np
 
 from fluidbench.measure.profiles import relative_l2
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 DEPTH, C, G = 0.2, 14.0, 9.81
 PERIOD = 4 * DEPTH / C
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
-    tank = scenario(
-        "hydrostatic_column", material={"density": 1000.0, "sound_speed": C},
+    tank = define(
+        "hydrostatic_column",
+        material={"density": 1000.0, "sound_speed": C},
         domain={"lower": [0, 0, 0], "upper": [0.1, 0.1, 0.3], "walls": {"z_lower": "slip"}},
         bodies=[{"kind": "box", "center": [0.05, 0.05, DEPTH / 2], "size": [0.1, 0.1, DEPTH]}],
-        duration=14 * PERIOD, output_interval=PERIOD / 8, spacing=spacing,
-    )  # fmt: skip
+        duration=14 * PERIOD,
+        output_interval=PERIOD / 8,
+        spacing=spacing,
+    )
     return {"tank": tank}
 
 
@@ -44,7 +48,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "hydrostatic_column", "water at rest in a smooth tank", "liquid", "exact; validation B",
-    "E2 of the mean pressure, d < z < H - 2 d", spacing=0.01, tolerance=0.03, scenarios=scenarios, evaluate=evaluate,
+    "hydrostatic_column",
+    "water at rest in a smooth tank",
+    "liquid",
+    "exact; references.md, B",
+    "E2 of the mean pressure, d < z < H - 2 d",
+    spacing=0.01,
+    tolerance=0.03,
+    scenarios=scenarios,
+    evaluate=evaluate,
     exempt={"pbd": "PBD has no pressure; its settlement is judged by pbd_stiffness"},
-)  # fmt: skip
+)

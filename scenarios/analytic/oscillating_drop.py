@@ -5,7 +5,8 @@ import numpy as np
 from fluidbench.measure.profiles import period, semi_axes
 from fluidbench.measure.reference import table
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 RADIUS, OMEGA, STRAIN, PERIODS = 0.05, 20.0, 0.3, 4.0
 CENTRE = [0.1, 0.1, 0.1]
@@ -14,15 +15,23 @@ CENTRE = [0.1, 0.1, 0.1]
 def scenarios(spacing: float) -> dict[str, Scenario]:
     rate, pull = STRAIN * OMEGA, -(OMEGA**2)
     body = {
-        "kind": "sphere", "center": CENTRE, "radius": RADIUS,
+        "kind": "sphere",
+        "center": CENTRE,
+        "radius": RADIUS,
         "velocity_gradient": [[rate, 0, 0], [0, rate, 0], [0, 0, -2 * rate]],
-    }  # fmt: skip
-    drop = scenario(
-        "oscillating_drop", domain={"lower": [0, 0, 0], "upper": [0.2, 0.2, 0.2]}, bodies=[body],
-        material={"density": 1000.0, "sound_speed": 15.0}, gravity=[0.0, 0.0, 0.0], body_force_center=CENTRE,
-        body_force_gradient=np.diag([pull, pull, pull]).tolist(), duration=PERIODS * 4.5233 / OMEGA,
-        output_interval=4.5233 / OMEGA / 24, spacing=spacing,
-    )  # fmt: skip
+    }
+    drop = define(
+        "oscillating_drop",
+        domain={"lower": [0, 0, 0], "upper": [0.2, 0.2, 0.2]},
+        bodies=[body],
+        material={"density": 1000.0, "sound_speed": 15.0},
+        gravity=[0.0, 0.0, 0.0],
+        body_force_center=CENTRE,
+        body_force_gradient=np.diag([pull, pull, pull]).tolist(),
+        duration=PERIODS * 4.5233 / OMEGA,
+        output_interval=4.5233 / OMEGA / 24,
+        spacing=spacing,
+    )
     return {"drop": drop}
 
 
@@ -46,7 +55,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "oscillating_drop", "an inviscid sphere oscillating in a central force", "liquid",
-    "exact; Monaghan & Rafiee 2013, axisymmetric form derived in validation B", "relative error of the period",
-    spacing=RADIUS / 10, tolerance=0.03, fine_tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
-)  # fmt: skip
+    "oscillating_drop",
+    "an inviscid sphere oscillating in a central force",
+    "liquid",
+    "exact; Monaghan & Rafiee 2013, axisymmetric form derived in references.md, B",
+    "relative error of the period",
+    spacing=RADIUS / 10,
+    tolerance=0.03,
+    fine_tolerance=0.02,
+    scenarios=scenarios,
+    evaluate=evaluate,
+)

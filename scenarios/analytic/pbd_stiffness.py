@@ -1,9 +1,10 @@
-"""How far a PBD liquid settles under its weight: proportional to dt^2 / n (validation I)."""
+"""How far a PBD liquid settles under its weight: proportional to dt^2 / n (references.md, I)."""
 
 import numpy as np
 
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 HEIGHT, SIDE = 0.2, 0.08
 PAIRS = ((8e-3, 32), (8e-3, 16), (4e-3, 16), (4e-3, 8), (4e-3, 4), (2e-3, 4), (2e-3, 2))  # (dt [s], iterations)
@@ -11,12 +12,17 @@ PAIRS = ((8e-3, 32), (8e-3, 16), (4e-3, 16), (4e-3, 8), (4e-3, 4), (2e-3, 4), (2
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
     def tank(tick: float, iterations: int) -> Scenario:
-        return scenario(
-            "pbd_stiffness", domain={"lower": [0, 0, 0], "upper": [SIDE, SIDE, 0.3], "walls": {"z_lower": "slip"}},
-            material={"density": 1000.0}, tick=tick, duration=1.2, output_interval=0.04, spacing=spacing,
+        return define(
+            "pbd_stiffness",
+            domain={"lower": [0, 0, 0], "upper": [SIDE, SIDE, 0.3], "walls": {"z_lower": "slip"}},
+            material={"density": 1000.0},
+            tick=tick,
+            duration=1.2,
+            output_interval=0.04,
+            spacing=spacing,
             bodies=[{"kind": "box", "center": [SIDE / 2, SIDE / 2, HEIGHT / 2], "size": [SIDE, SIDE, HEIGHT]}],
             numerics={"pbd": {"iterations": iterations, "advance": 1.0}},
-        )  # fmt: skip
+        )
 
     return {f"{tick} {n}": tank(tick, n) for tick, n in PAIRS}
 
@@ -48,9 +54,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     return Finding(float(departure.max()), numbers, (curve,))
 
 
-ONLY = "the case measures the numerical stiffness of position-based dynamics"
 CASE = Case(
-    "pbd_stiffness", "settlement of a PBD liquid against dt and iterations", "numerics",
-    "scaling dt^2 / n; validation I", "largest departure of the settlement from dt^2 / n, packing taken off",
-    spacing=0.01, tolerance=0.2, scenarios=scenarios, evaluate=evaluate, skipped={"mpm": ONLY, "sph": ONLY},
-)  # fmt: skip
+    "pbd_stiffness",
+    "settlement of a PBD liquid against dt and iterations",
+    "numerics",
+    "scaling dt^2 / n; references.md, I",
+    "largest departure of the settlement from dt^2 / n, packing taken off",
+    spacing=0.01,
+    tolerance=0.2,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    about="pbd",
+)

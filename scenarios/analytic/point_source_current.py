@@ -7,7 +7,8 @@ from fluidbench.measure.profiles import relative_l2
 from fluidbench.measure.reference import table
 from fluidbench.measure.slump import radial_heights, spread_radius
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 NOZZLE, FLUX, NU, G = 0.005, 2.34e-5, 1.4e-3, 9.81
 THICK = (3 * NU * FLUX / G) ** 0.25  # h_s = 10 mm
@@ -16,13 +17,16 @@ END = 40.0
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
-    puddle = scenario(
-        "point_source_current", domain={"lower": [-0.06, -0.06, 0], "upper": [0.06, 0.06, 0.022]},
+    puddle = define(
+        "point_source_current",
+        domain={"lower": [-0.06, -0.06, 0], "upper": [0.06, 0.06, 0.022]},
         material={"density": 1000.0, "viscosity": 1000.0 * NU},
         nozzle={"diameter": 2 * NOZZLE, "flow_rate": FLUX, "standoff": 0.015},
         toolpath={"kind": "line", "start": [0.0, 0.0], "end": [1e-6, 0.0], "speed": 1e-6 / (END * UNIT)},
-        duration=END * UNIT, output_interval=UNIT, spacing=spacing,
-    )  # fmt: skip
+        duration=END * UNIT,
+        output_interval=UNIT,
+        spacing=spacing,
+    )
     return {"puddle": puddle}
 
 
@@ -41,22 +45,36 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     inner = (share > max(0.2, 2 * NOZZLE / (front[-1] * THICK))) & (share < 0.9)
     wanted = np.interp(share[inner], exact["y"], exact["H"])
     numbers = (
-        Number("exponent of r_N", exponent, 0.5), Number("r_N / (h_s sqrt(t / t_s))", prefactor, 0.71502),
+        Number("exponent of r_N", exponent, 0.5),
+        Number("r_N / (h_s sqrt(t / t_s))", prefactor, 0.71502),
         Number("E2 of the profile", relative_l2(height[inner] / THICK, wanted), 0.0),
         Number("volume of the puddle over that emitted", filled / (FLUX * float(run.times[-1])), 1.0),
         Number("front at the end [m]", float(front[-1] * THICK), 0.71502 * THICK * float(np.sqrt(clock[-1]))),
-    )  # fmt: skip
+    )
     curves = (
         Curve("front", "t / t_s", "r_N / h_s", clock, front, clock, 0.71502 * np.sqrt(clock)),
-        Curve("profile", "r / r_N", "h / h_s", share[inner], height[inner] / THICK, exact["y"].to_numpy(),
-              exact["H"].to_numpy()),
-    )  # fmt: skip
+        Curve(
+            "profile",
+            "r / r_N",
+            "h / h_s",
+            share[inner],
+            height[inner] / THICK,
+            exact["y"].to_numpy(),
+            exact["H"].to_numpy(),
+        ),
+    )
     return Finding(max(abs(exponent - 0.5) * 0.05 / 0.03, abs(prefactor / 0.71502 - 1.0)), numbers, curves)
 
 
 CASE = Case(
-    "point_source_current", "a viscous puddle fed through a nozzle", "viscous", "lubrication theory; Huppert 1982",
-    "worse of prefactor error and 5/3 of the error of the exponent", spacing=THICK / 6, tolerance=0.05,
-    scenarios=scenarios, evaluate=evaluate,
+    "point_source_current",
+    "a viscous puddle fed through a nozzle",
+    "viscous",
+    "lubrication theory; Huppert 1982",
+    "worse of prefactor error and 5/3 of the error of the exponent",
+    spacing=THICK / 6,
+    tolerance=0.05,
+    scenarios=scenarios,
+    evaluate=evaluate,
     exempt={"pbd": "velocity smoothing makes the viscosity depend on dt; exponent and prefactor are reported"},
-)  # fmt: skip
+)

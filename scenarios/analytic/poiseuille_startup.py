@@ -4,7 +4,8 @@ import numpy as np
 
 from fluidbench.measure.profiles import relative_l2
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 WIDTH, NU = 0.02, 1e-4
 FORCE = 8 * NU * (NU / WIDTH) / WIDTH**2  # Re = u_max L / nu = 1
@@ -14,15 +15,21 @@ TIMES = (0.02, 0.1, 0.6)  # nu t / L^2
 def scenarios(spacing: float) -> dict[str, Scenario]:
     side = 8 * spacing
     walls = {f"{axis}_{end}": "periodic" for axis in "xz" for end in ("lower", "upper")}
-    channel = scenario(
+    channel = define(
         "poiseuille_startup",
-        domain={"lower": [0, 0, 0], "upper": [side, WIDTH, side],
-                "walls": {**walls, "y_lower": "stick", "y_upper": "stick"}},
+        domain={
+            "lower": [0, 0, 0],
+            "upper": [side, WIDTH, side],
+            "walls": {**walls, "y_lower": "stick", "y_upper": "stick"},
+        },
         material={"density": 1000.0, "viscosity": 1000.0 * NU, "sound_speed": 0.1},
         bodies=[{"kind": "box", "center": [side / 2, WIDTH / 2, side / 2], "size": [side, WIDTH, side]}],
-        gravity=[0.0, 0.0, 0.0], body_force=[FORCE, 0.0, 0.0], duration=TIMES[-1] * WIDTH**2 / NU,
-        output_interval=0.02 * WIDTH**2 / NU, spacing=spacing,
-    )  # fmt: skip
+        gravity=[0.0, 0.0, 0.0],
+        body_force=[FORCE, 0.0, 0.0],
+        duration=TIMES[-1] * WIDTH**2 / NU,
+        output_interval=0.02 * WIDTH**2 / NU,
+        spacing=spacing,
+    )
     return {"channel": channel}
 
 
@@ -52,9 +59,17 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "poiseuille_startup", "start-up of flow between no-slip walls", "viscous", "exact; Morris et al. 1997, eq. 21",
-    "E2 of velocity, worst of nu t / L^2 = 0.02, 0.1, 0.6", spacing=WIDTH / 20, tolerance=0.03, fine_tolerance=0.02,
-    scenarios=scenarios, evaluate=evaluate, quick=WIDTH / 20,
+    "poiseuille_startup",
+    "start-up of flow between no-slip walls",
+    "viscous",
+    "exact; Morris et al. 1997, eq. 21",
+    "E2 of velocity, worst of nu t / L^2 = 0.02, 0.1, 0.6",
+    spacing=WIDTH / 20,
+    tolerance=0.03,
+    fine_tolerance=0.02,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=WIDTH / 20,
     causes={"mpm": "second order, but the channel is only 10 cells across; passes at two thirds of the spacing"},
     exempt={"pbd": "the viscosity of velocity smoothing is calibrated in bulk, not at walls"},
-)  # fmt: skip
+)

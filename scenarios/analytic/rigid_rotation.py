@@ -1,23 +1,31 @@
-"""A spinning elastic disc keeps its angular momentum (validation A, exact)."""
+"""A spinning elastic disc keeps its angular momentum (references.md, A, exact)."""
 
 import numpy as np
 
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 OMEGA, TURNS, CENTRE = 10.0, 2.0, np.array([0.15, 0.15, 0.1])
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
     body = {
-        "kind": "cylinder", "center": CENTRE.tolist(), "radius": 0.1, "height": 0.05,
+        "kind": "cylinder",
+        "center": CENTRE.tolist(),
+        "radius": 0.1,
+        "height": 0.05,
         "angular_velocity": [0.0, 0.0, OMEGA],
-    }  # fmt: skip
-    disc = scenario(
-        "rigid_rotation", domain={"lower": [0, 0, 0], "upper": [0.3, 0.3, 0.2]}, bodies=[body],
-        material={"density": 1000.0, "youngs_modulus": 1e6, "poisson_ratio": 0.3}, gravity=[0.0, 0.0, 0.0],
-        duration=TURNS * 2 * np.pi / OMEGA, spacing=spacing,
-    )  # fmt: skip
+    }
+    disc = define(
+        "rigid_rotation",
+        domain={"lower": [0, 0, 0], "upper": [0.3, 0.3, 0.2]},
+        bodies=[body],
+        material={"density": 1000.0, "youngs_modulus": 1e6, "poisson_ratio": 0.3},
+        gravity=[0.0, 0.0, 0.0],
+        duration=TURNS * 2 * np.pi / OMEGA,
+        spacing=spacing,
+    )
     return {"disc": disc}
 
 
@@ -32,7 +40,7 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     """|L / L0 - 1| per turn; PBD against the formula of what it loses."""
     run = runs["disc"]
     share = np.array([momentum(frame) for frame in run.frames]) / momentum(run.frames[0])
-    # projection moves particles inwards across their velocity (validation A)
+    # projection moves particles inwards across their velocity (references.md, A)
     stiff = 1.0 / np.sqrt(1.0 + 2.0 * OMEGA**2 * run.dt * run.times)
     numbers = (
         Number("L / L0 after two turns", share[-1], 1.0),
@@ -44,7 +52,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "rigid_rotation", "an elastic disc spinning freely", "kinematics", "exact; validation A",
+    "rigid_rotation",
+    "an elastic disc spinning freely",
+    "kinematics",
+    "exact; references.md, A",
     "|L / L0 - 1| per turn; PBD: departure from L0 / sqrt(1 + 2 omega^2 dt t)",
-    spacing=0.01, tolerance=1e-3, tolerances={"pbd": 0.1}, scenarios=scenarios, evaluate=evaluate,
-)  # fmt: skip
+    spacing=0.01,
+    tolerance=1e-3,
+    tolerances={"pbd": 0.1},
+    scenarios=scenarios,
+    evaluate=evaluate,
+)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 LENGTH, POISSON, G = 0.1, 0.3, 9.81
 MODULUS = 1000.0 * G * LENGTH / 0.1  # lambda + 2 mu: q = rho g L / M = 0.1
@@ -14,13 +15,15 @@ PERIOD = 4 * LENGTH / np.sqrt(MODULUS / 1000.0)
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
     side = 4 * spacing
-    column = scenario(
+    column = define(
         "self_weight_column",
         domain={"lower": [0, 0, 0], "upper": [side, side, 1.1 * LENGTH], "walls": {"z_lower": "slip"}},
         material={"density": 1000.0, "youngs_modulus": YOUNG, "poisson_ratio": POISSON, "viscosity": 20.0},
         bodies=[{"kind": "box", "center": [side / 2, side / 2, LENGTH / 2], "size": [side, side, LENGTH]}],
-        duration=8 * PERIOD, output_interval=PERIOD / 16, spacing=spacing,
-    )  # fmt: skip
+        duration=8 * PERIOD,
+        output_interval=PERIOD / 16,
+        spacing=spacing,
+    )
     return {"column": column}
 
 
@@ -52,8 +55,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "self_weight_column", "a confined elastic column under its own weight", "elastic",
-    "exact for the law of solvers/constitutive.py; validation E", "relative error of the top's settlement",
-    spacing=LENGTH / 50, tolerance=0.01, fine_tolerance=0.005, scenarios=scenarios, evaluate=evaluate,
+    "self_weight_column",
+    "a confined elastic column under its own weight",
+    "elastic",
+    "exact for the law of solvers/constitutive.py; references.md, E",
+    "relative error of the top's settlement",
+    spacing=LENGTH / 50,
+    tolerance=0.01,
+    fine_tolerance=0.005,
+    scenarios=scenarios,
+    evaluate=evaluate,
     exempt={"pbd": "bonds are central forces: the confined modulus is 1.2 E, here it should be 1.35 E"},
-)  # fmt: skip
+)

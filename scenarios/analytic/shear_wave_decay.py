@@ -4,7 +4,8 @@ import numpy as np
 
 from fluidbench.measure.profiles import sine_amplitude
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 from solvers.pbd.solver import ConfigPBD, largest_viscosity
 
 LENGTH, NU, SPEED = 0.16, 0.01, 0.1
@@ -15,14 +16,20 @@ WALLS = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upp
 def scenarios(spacing: float) -> dict[str, Scenario]:
     side = 8 * spacing
     body = {
-        "kind": "box", "center": [side / 2, side / 2, LENGTH / 2], "size": [side, side, LENGTH],
+        "kind": "box",
+        "center": [side / 2, side / 2, LENGTH / 2],
+        "size": [side, side, LENGTH],
         "wave": {"amplitude": [SPEED, 0, 0], "number": [0, 0, K], "phase": float(K * LENGTH / 2)},
-    }  # fmt: skip
-    wave = scenario(
-        "shear_wave_decay", domain={"lower": [0, 0, 0], "upper": [side, side, LENGTH], "walls": WALLS},
-        material={"density": 1000.0, "viscosity": 1000.0 * NU, "sound_speed": 100 * SPEED}, bodies=[body],
-        gravity=[0.0, 0.0, 0.0], duration=1.0 / (NU * K * K), spacing=spacing,
-    )  # fmt: skip
+    }
+    wave = define(
+        "shear_wave_decay",
+        domain={"lower": [0, 0, 0], "upper": [side, side, LENGTH], "walls": WALLS},
+        material={"density": 1000.0, "viscosity": 1000.0 * NU, "sound_speed": 100 * SPEED},
+        bodies=[body],
+        gravity=[0.0, 0.0, 0.0],
+        duration=1.0 / (NU * K * K),
+        spacing=spacing,
+    )
     return {"wave": wave}
 
 
@@ -33,13 +40,13 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     seen = -np.polyfit(run.times, np.log(np.maximum(amplitude, 1e-12)), 1)[0] / K**2
     expected = NU
     if run.method == "pbd":
-        config = ConfigPBD(**run.record["config"])
+        config = ConfigPBD(**run.record.config)
         expected = min(NU, largest_viscosity(run.scenario, config, run.dt) / 1000.0)
     numbers = (Number("viscosity of the material [m^2/s]", seen, NU),)
     if run.method == "pbd":
         numbers += (Number("viscosity that velocity smoothing reaches [m^2/s]", seen, expected),)
     if run.method == "mpm":
-        dx = run.record["config"]["grid_ratio"] * run.scenario.spacing
+        dx = run.record.config["grid_ratio"] * run.scenario.spacing
         extra = 0.024 * K**2 * dx**4 / run.dt
         numbers += (Number("viscosity with that of the APIC transfer [m^2/s]", seen, NU + extra),)
     exact = np.exp(-NU * K**2 * run.times)
@@ -48,7 +55,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "shear_wave_decay", "decay of a shear wave in a periodic box", "viscous", "exact; validation C",
-    "|nu_eff / nu - 1|; PBD: against the formula of its velocity smoothing", spacing=LENGTH / 64, tolerance=0.03,
-    tolerances={"pbd": 0.2}, scenarios=scenarios, evaluate=evaluate, quick=LENGTH / 64,
-)  # fmt: skip
+    "shear_wave_decay",
+    "decay of a shear wave in a periodic box",
+    "viscous",
+    "exact; references.md, C",
+    "|nu_eff / nu - 1|; PBD: against the formula of its velocity smoothing",
+    spacing=LENGTH / 64,
+    tolerance=0.03,
+    tolerances={"pbd": 0.2},
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=LENGTH / 64,
+)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from fluidbench.library import load
 from fluidbench.measure.reference import table
 from fluidbench.scenario import Scenario
+from fluidbench.scenario.library import load
 from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 HEIGHT, WEIGHT = 0.1, 981.0  # H [m], rho g H [Pa]
@@ -21,7 +21,7 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     """Largest |s' - s'_ref| over the yield stresses."""
     data = table("viscoplastic_slump_crosscheck")
     best = data[["slump_vof", "slump_mpm_extrap"]].mean(axis=1).to_numpy()
-    seen = np.array([run.record["measures"]["slump"] for run in runs.values()])
+    seen = np.array([run.record.measures["slump"] for run in runs.values()])
     wanted = np.interp(STRESSES, data["tau_prime"], best)
     numbers = tuple(Number(f"slump at tau' = {t}", a, b) for t, a, b in zip(STRESSES, seen, wanted, strict=True))
     x = np.sqrt(3.0) * data["tau_prime"]
@@ -33,8 +33,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "slump_cylinder", "slump of a yield-stress cylinder on a rough floor", "yield stress",
+    "slump_cylinder",
+    "slump of a yield-stress cylinder on a rough floor",
+    "yield stress",
     "two computations in viscoplastic_slump_crosscheck.csv; classical theory: Murata 1984, Pashias et al. 1996",
-    "largest |s' - s'_ref| over tau' = 0.1, 0.2, 0.3", spacing=HEIGHT / 24, tolerance=0.07, fine_tolerance=0.04,
-    scenarios=scenarios, evaluate=evaluate, exempt={"pbd": "shear stiffness is limited by the time step"},
-)  # fmt: skip
+    "largest |s' - s'_ref| over tau' = 0.1, 0.2, 0.3",
+    spacing=HEIGHT / 24,
+    tolerance=0.07,
+    fine_tolerance=0.04,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    exempt={"pbd": "shear stiffness is limited by the time step"},
+)

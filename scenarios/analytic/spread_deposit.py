@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from fluidbench.library import load
 from fluidbench.measure.ledger import deposit_of
 from fluidbench.measure.profiles import relative_l2
 from fluidbench.measure.reference import table
 from fluidbench.measure.slump import radial_heights
 from fluidbench.scenario import Scenario
+from fluidbench.scenario.library import load
 from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 HEIGHT, TAU = 0.1, 0.05
@@ -29,7 +29,7 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     """|R - R_ref| / R_ref against the volume-of-fluid computation, and the theory's profile apart from the last 2 d."""
     run = runs["deposit"]
     data = table("viscoplastic_slump_crosscheck").set_index("tau_prime").loc[TAU]
-    front = run.record["measures"]["spread_radius_m"]
+    front = run.record.measures["spread_radius_m"]
     radius, height = radial_heights(deposit_of(run.frames[-1], run.scenario), 0.0, 0.0)
     inside = radius < data["spread_vof"] * HEIGHT - 2 * run.scenario.spacing
     theory = profile(radius, data["spread_second"] * HEIGHT)
@@ -37,7 +37,7 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     numbers = (
         Number("R / H", front / HEIGHT, float(data["spread_vof"])),
         Number("R / H, second-order theory", front / HEIGHT, float(data["spread_second"])),
-        Number("slump", run.record["measures"]["slump"], float(data["slump_vof"])),
+        Number("slump", run.record.measures["slump"], float(data["slump_vof"])),
         Number("E2 of the profile against the theory", shape, 0.0),
     )
     curve = Curve("profile", "r [m]", "h [m]", radius, height, radius, theory)
@@ -46,9 +46,14 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "spread_deposit", "final shape of a soft yield-stress deposit", "yield stress",
+    "spread_deposit",
+    "final shape of a soft yield-stress deposit",
+    "yield stress",
     "volume-of-fluid computation (viscoplastic_slump_crosscheck.csv); Roussel & Coussot 2005, Dubash et al. 2009",
     "worse of |R / R_ref - 1| and 4/5 of the profile's E2, tau' = 0.05",
-    spacing=HEIGHT / 20, tolerance=0.08, scenarios=scenarios, evaluate=evaluate,
+    spacing=HEIGHT / 20,
+    tolerance=0.08,
+    scenarios=scenarios,
+    evaluate=evaluate,
     exempt={"pbd": "shear stiffness is limited by the time step"},
-)  # fmt: skip
+)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 from .self_weight_column import LENGTH, PERIOD, POISSON, YOUNG
 
@@ -14,16 +15,23 @@ CURES = {"jump": {"kind": "jump"}, "linear": {"kind": "linear", "time": PERIOD}}
 def scenarios(spacing: float) -> dict[str, Scenario]:
     side = 4 * spacing
     return {
-        label: scenario(
+        label: define(
             f"stiffening_{label}",
             domain={"lower": [0, 0, 0], "upper": [side, side, 1.1 * LENGTH], "walls": {"z_lower": "slip"}},
-            material={"density": 1000.0, "youngs_modulus": YOUNG, "poisson_ratio": POISSON, "viscosity": 100.0,
-                      "cure": cure | {"delay": ONSET, "youngs_modulus": STIFFER * YOUNG}},
+            material={
+                "density": 1000.0,
+                "youngs_modulus": YOUNG,
+                "poisson_ratio": POISSON,
+                "viscosity": 100.0,
+                "cure": cure | {"delay": ONSET, "youngs_modulus": STIFFER * YOUNG},
+            },
             bodies=[{"kind": "box", "center": [side / 2, side / 2, LENGTH / 2], "size": [side, side, LENGTH]}],
-            duration=8 * PERIOD, output_interval=PERIOD / 16, spacing=spacing,
+            duration=8 * PERIOD,
+            output_interval=PERIOD / 16,
+            spacing=spacing,
         )
         for label, cure in CURES.items()
-    }  # fmt: skip
+    }
 
 
 def evaluate(runs: dict[str, Run]) -> Finding:
@@ -45,8 +53,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "stiffening_under_load", "a column that cures under its own weight", "process",
-    "d sigma = E(t) d eps: strain stays sigma / E0; validation E", "relative change of the settlement by the cure",
-    spacing=LENGTH / 25, tolerance=0.05, scenarios=scenarios, evaluate=evaluate, quick=LENGTH / 16,
+    "stiffening_under_load",
+    "a column that cures under its own weight",
+    "process",
+    "d sigma = E(t) d eps: strain stays sigma / E0; references.md, E",
+    "relative change of the settlement by the cure",
+    spacing=LENGTH / 25,
+    tolerance=0.05,
+    scenarios=scenarios,
+    evaluate=evaluate,
+    quick=LENGTH / 16,
     exempt={"pbd": "bonds meet only as far as their sweeps: the stiffened column creeps by some per cent"},
-)  # fmt: skip
+)

@@ -4,23 +4,26 @@ import numpy as np
 
 from fluidbench.measure.ledger import deposit_of
 from fluidbench.scenario import Scenario
-from fluidbench.study.case import Case, Curve, Finding, Number, Run, scenario
+from fluidbench.scenario.library import define
+from fluidbench.study.case import Case, Curve, Finding, Number, Run
 
 HEIGHT, RADIUS, G = 0.1, 0.02, 9.81
 NU = np.sqrt(G * HEIGHT**3)  # g H^3 / nu^2 = 1
-LAG = 5 / 108  # inertia delays the curve by this much in tau (validation C)
+LAG = 5 / 108  # inertia delays the curve by this much in tau (references.md, C)
 END = 0.8
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
     duration = END * 3 * NU / (G * HEIGHT)
-    column = scenario(
+    column = define(
         "viscous_column_slip",
         domain={"lower": [0, 0, 0], "upper": [0.04, 0.04, 0.12], "walls": {"z_lower": "slip"}},
         material={"density": 1000.0, "viscosity": 1000.0 * NU, "sound_speed": 10.0},
         bodies=[{"kind": "cylinder", "center": [0, 0, HEIGHT / 2], "radius": RADIUS, "height": HEIGHT}],
-        duration=duration, output_interval=duration / 16, spacing=spacing,
-    )  # fmt: skip
+        duration=duration,
+        output_interval=duration / 16,
+        spacing=spacing,
+    )
     return {"column": column}
 
 
@@ -45,8 +48,15 @@ def evaluate(runs: dict[str, Run]) -> Finding:
 
 
 CASE = Case(
-    "viscous_column_slip", "a slender viscous column sinking on a slip floor", "viscous",
-    "slender theory, error (R/H)^2/2 = 2 %; Trouton 1906, validation C", "largest |h / h_ref - 1|, 0.2 <= tau <= 0.8",
-    spacing=RADIUS / 8, tolerance=0.03, fine_tolerance=0.02, scenarios=scenarios, evaluate=evaluate,
+    "viscous_column_slip",
+    "a slender viscous column sinking on a slip floor",
+    "viscous",
+    "slender theory, error (R/H)^2/2 = 2 %; Trouton 1906, references.md, C",
+    "largest |h / h_ref - 1|, 0.2 <= tau <= 0.8",
+    spacing=RADIUS / 8,
+    tolerance=0.03,
+    fine_tolerance=0.02,
+    scenarios=scenarios,
+    evaluate=evaluate,
     exempt={"pbd": "velocity smoothing cannot reach this viscosity at PBD's time step"},
-)  # fmt: skip
+)

@@ -9,8 +9,8 @@ import numpy as np
 import warp as wp
 
 from fluidbench.errors import UserError
+from fluidbench.native.scene import Scene
 from fluidbench.scenario import Domain
-from fluidbench.scene import Scene
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -47,13 +47,23 @@ def cells_of(domain: Domain, wanted: float) -> tuple[np.ndarray, np.ndarray]:
     return cells, length / cells
 
 
+def blocks_along(cells: np.ndarray) -> np.ndarray:
+    """Blocks of 4 nodes along each axis."""
+    return (cells + 2 * FIRST + 2) // 4 + 1
+
+
+def blocks_of(domain: Domain, wanted: float) -> float:
+    """How many blocks of 4^3 nodes a domain holds, with cells of about the edge wanted [m]."""
+    return float(np.prod(blocks_along(cells_of(domain, wanted)[0]).astype(float)))
+
+
 def grid_of(scene: Scene, wanted: float) -> Grid:
     """The grid of a scene with cells of about the edge wanted [m]."""
     domain, grid = scene.scenario.domain, Grid()
     cells, dx = cells_of(domain, wanted)
     lone = np.asarray(scene.periodic) & (cells % 4 == 1)
     first = np.where(lone, FIRST + 2, FIRST)
-    blocks = (cells + 2 * FIRST + 2) // 4 + 1
+    blocks = blocks_along(cells)
     if int(np.prod(blocks)) * scene.worlds > MAX_BLOCKS:
         raise UserError(f"the domain holds {np.prod(blocks):.3g} grid blocks; use a smaller domain or a larger spacing")
     grid.origin, grid.first = wp.vec3(*(np.asarray(domain.lower) - first * dx)), wp.vec3i(*first.tolist())
@@ -89,9 +99,16 @@ def first_node(grid: Grid, x: wp.vec3):
 
 @wp.func
 def activate_block(
-    grid: Grid, world: int, i: int, j: int, k: int, table: wp.array(dtype=int), block_of: wp.array(dtype=int),
-    active: wp.array(dtype=int), fault: wp.array(dtype=int),
-):  # fmt: skip
+    grid: Grid,
+    world: int,
+    i: int,
+    j: int,
+    k: int,
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
     """Give the block of node (i, j, k) a slot unless it has one."""
     b = (((i >> 2) * grid.blocks[1] + (j >> 2)) * grid.blocks[2] + (k >> 2)) + world * grid.blocks_per_world
     if table[b] == 0:
@@ -107,9 +124,14 @@ def activate_block(
 
 @wp.func
 def activate_stencil(
-    grid: Grid, world: int, base: wp.vec3i, table: wp.array(dtype=int), block_of: wp.array(dtype=int),
-    active: wp.array(dtype=int), fault: wp.array(dtype=int),
-):  # fmt: skip
+    grid: Grid,
+    world: int,
+    base: wp.vec3i,
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
     """Activate the blocks of the 27 nodes that start at `base`: those of its eight corners."""
     for corner in range(8):
         i = wrapped(base[0] + 2 * (corner >> 2), grid.first[0], grid.wrap[0])
@@ -160,11 +182,15 @@ def node_parts(grid: Grid, base: wp.vec3i):
 def slots_of(table: wp.array(dtype=int), start: int, bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i):
     """Slots of the (at most) eight blocks of a stencil, -1 where there is none; z varies fastest."""
     return (
-        table[start + bx[0] + by[0] + bz[0]] - 1, table[start + bx[0] + by[0] + bz[2]] - 1,
-        table[start + bx[0] + by[2] + bz[0]] - 1, table[start + bx[0] + by[2] + bz[2]] - 1,
-        table[start + bx[2] + by[0] + bz[0]] - 1, table[start + bx[2] + by[0] + bz[2]] - 1,
-        table[start + bx[2] + by[2] + bz[0]] - 1, table[start + bx[2] + by[2] + bz[2]] - 1,
-    )  # fmt: skip
+        table[start + bx[0] + by[0] + bz[0]] - 1,
+        table[start + bx[0] + by[0] + bz[2]] - 1,
+        table[start + bx[0] + by[2] + bz[0]] - 1,
+        table[start + bx[0] + by[2] + bz[2]] - 1,
+        table[start + bx[2] + by[0] + bz[0]] - 1,
+        table[start + bx[2] + by[0] + bz[2]] - 1,
+        table[start + bx[2] + by[2] + bz[0]] - 1,
+        table[start + bx[2] + by[2] + bz[2]] - 1,
+    )
 
 
 @wp.kernel
@@ -178,10 +204,16 @@ def reset_blocks(table: wp.array(dtype=int), block_of: wp.array(dtype=int), acti
 
 @wp.kernel
 def find_blocks(
-    grid: Grid, capacity: int, count: wp.array(dtype=int), position: wp.array(dtype=wp.vec3),
+    grid: Grid,
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
     # outputs
-    table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), fault: wp.array(dtype=int),
-):  # fmt: skip
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
     """Activate the blocks around every particle."""
     p = wp.tid()
     world = p / capacity

@@ -3,7 +3,7 @@
 Functions over `axis` are unrolled: it is known when they are compiled.
 """
 
-from fluidbench.scene import FRICTION, PERIODIC, STICK
+from fluidbench.native.scene import FRICTION, PERIODIC, STICK
 
 from ..taichi_bridge import Ints, Quads, Vectors, ivec3, struct_of, ti, vec3, vec4
 from .grid import FAULT_BLOCKS, FIRST, Grid
@@ -248,9 +248,15 @@ def reset_blocks(table: Ints, block_of: Ints, active: Ints, lanes: int):
 
 @ti.kernel
 def find_blocks(
-    grid: GridT, capacity: int, count: Ints, position: Vectors,
-    table: Ints, block_of: Ints, active: Ints, fault: Ints,
-):  # fmt: skip
+    grid: GridT,
+    capacity: int,
+    count: Ints,
+    position: Vectors,
+    table: Ints,
+    block_of: Ints,
+    active: Ints,
+    fault: Ints,
+):
     known = slots_in_use(active, block_of)
     for p in range(position.shape[0]):
         world = p // capacity

@@ -3,7 +3,8 @@
 import functools
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, CLAMPED, FAULT_ASTRAY, FREE
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.pool import FAULT_ASTRAY
 
 from ..flow_taichi import pressure, strained
 from ..smoothing import quadratic_spline
@@ -80,11 +81,24 @@ def kirchhoff(phase, j, b, s, rate):
 
 @ti.kernel
 def g2p(
-    grid: GridT, capacity: int, count: Ints, dt: Floats, moving: Quads, phases: Phases, phase_of: Ints, held: Ints,
+    grid: GridT,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    moving: Quads,
+    phases: Phases,
+    phase_of: Ints,
+    held: Ints,
     feedback: FeedbackT,
-    position: Vectors, velocity: Vectors, affine: Matrices, volume_ratio: Floats,
-    table: Ints, block_of: Ints, active: Ints, fault: Ints,
-):  # fmt: skip
+    position: Vectors,
+    velocity: Vectors,
+    affine: Matrices,
+    volume_ratio: Floats,
+    table: Ints,
+    block_of: Ints,
+    active: Ints,
+    fault: Ints,
+):
     known = slots_in_use(active, block_of)
     for p in range(position.shape[0]):
         world = p // capacity
@@ -144,10 +158,26 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
 
     @ti.kernel
     def p2g(
-        grid: GridT, capacity: int, count: Ints, dt: Floats, phases: Phases, position: Vectors, velocity: Vectors,
-        affine: Matrices, mass: Floats, volume: Floats, phase_of: Ints, held: Ints, table: Ints,
-        volume_ratio: Floats, elastic_normal: Vectors, elastic_shear: Vectors, raw: Quads, fill: Quads, fault: Ints,
-    ):  # fmt: skip
+        grid: GridT,
+        capacity: int,
+        count: Ints,
+        dt: Floats,
+        phases: Phases,
+        position: Vectors,
+        velocity: Vectors,
+        affine: Matrices,
+        mass: Floats,
+        volume: Floats,
+        phase_of: Ints,
+        held: Ints,
+        table: Ints,
+        volume_ratio: Floats,
+        elastic_normal: Vectors,
+        elastic_shear: Vectors,
+        raw: Quads,
+        fill: Quads,
+        fault: Ints,
+    ):
         for p in range(position.shape[0]):
             world = p // capacity
             if p - world * capacity < count[world]:
@@ -187,10 +217,18 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
 
     @ti.kernel
     def grid_step(
-        grid: GridT, lanes: int, active: Ints, block_of: Ints, table: Ints, raw: Quads, fill: Quads, dt: Floats,
-        force: Forces, phases: Phases,
+        grid: GridT,
+        lanes: int,
+        active: Ints,
+        block_of: Ints,
+        table: Ints,
+        raw: Quads,
+        fill: Quads,
+        dt: Floats,
+        force: Forces,
+        phases: Phases,
         moving: Quads,
-    ):  # fmt: skip
+    ):
         for t in range(ti.min(active[0] * 64, raw.shape[0])):
             block = block_of[t // 64]
             world = block // grid.blocks_per_world

@@ -9,8 +9,9 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.particles import CARRIED, CLAMPED, FAULT_ASTRAY, FREE
-from fluidbench.scene import Force, Phase, force_at, is_solid, too_fast
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.pool import FAULT_ASTRAY
+from fluidbench.native.scene import Force, Phase, force_at, is_solid, too_fast
 
 from .. import constitutive
 from ..bind import rebound, warp_func
@@ -47,10 +48,16 @@ ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [
 def columns_scaled(m: wp.mat33, by: wp.vec3):
     """m diag(by)."""
     return wp.mat33(
-        m[0, 0] * by[0], m[0, 1] * by[1], m[0, 2] * by[2],
-        m[1, 0] * by[0], m[1, 1] * by[1], m[1, 2] * by[2],
-        m[2, 0] * by[0], m[2, 1] * by[1], m[2, 2] * by[2],
-    )  # fmt: skip
+        m[0, 0] * by[0],
+        m[0, 1] * by[1],
+        m[0, 2] * by[2],
+        m[1, 0] * by[0],
+        m[1, 1] * by[1],
+        m[1, 2] * by[2],
+        m[2, 0] * by[0],
+        m[2, 1] * by[1],
+        m[2, 2] * by[2],
+    )
 
 
 @wp.func
@@ -60,10 +67,16 @@ def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocit
     g = phase.shear_modulus
     m = g * (b[0] + b[1] + b[2]) / 3.0 + p
     tau = wp.mat33(
-        g * b[0] - m, g * s[0], g * s[1],
-        g * s[0], g * b[1] - m, g * s[2],
-        g * s[1], g * s[2], g * b[2] - m,
-    )  # fmt: skip
+        g * b[0] - m,
+        g * s[0],
+        g * s[1],
+        g * s[0],
+        g * b[1] - m,
+        g * s[2],
+        g * s[1],
+        g * s[2],
+        g * b[2] - m,
+    )
     if phase.viscosity > 0.0:
         rate = 0.5 * (velocity_gradient + wp.transpose(velocity_gradient))
         mean = wp.trace(rate) / 3.0
@@ -73,15 +86,27 @@ def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocit
 
 
 def p2g(
-    grid: Grid, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), phases: wp.array2d(dtype=Phase),
-    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), affine: wp.array(dtype=wp.mat33),
-    mass: wp.array(dtype=float), volume: wp.array(dtype=float), phase_of: wp.array(dtype=int),
-    held: wp.array(dtype=int), table: wp.array(dtype=int),
+    grid: Grid,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+    affine: wp.array(dtype=wp.mat33),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    table: wp.array(dtype=int),
     # outputs
-    volume_ratio: wp.array(dtype=float), elastic_normal: wp.array(dtype=wp.vec3),
-    elastic_shear: wp.array(dtype=wp.vec3), raw: wp.array(dtype=wp.vec4), fill: wp.array(dtype=wp.vec4),
+    volume_ratio: wp.array(dtype=float),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+    raw: wp.array(dtype=wp.vec4),
+    fill: wp.array(dtype=wp.vec4),
     fault: wp.array(dtype=int),
-):  # fmt: skip
+):
     """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18).
 
     Where rest densities differ (EXPANDS) mass does not tell how full a node is: `fill` collects fresh density times
@@ -111,11 +136,28 @@ def p2g(
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
             b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2],
-                b[0], b[1], b[2], s[0], s[1], s[2],
-                phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
-                phase.relaxation_rate, h,
-            )  # fmt: skip
+                c[0, 0],
+                c[0, 1],
+                c[0, 2],
+                c[1, 0],
+                c[1, 1],
+                c[1, 2],
+                c[2, 0],
+                c[2, 1],
+                c[2, 2],
+                b[0],
+                b[1],
+                b[2],
+                s[0],
+                s[1],
+                s[2],
+                phase.shear_modulus,
+                phase.yield_stress,
+                phase.plastic_viscosity,
+                phase.flow_index,
+                phase.relaxation_rate,
+                h,
+            )
             b = wp.vec3(b_xx, b_yy, b_zz)
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[p] = b
@@ -158,12 +200,19 @@ def p2g(
 
 
 def grid_step(
-    grid: Grid, lanes: int, active: wp.array(dtype=int), block_of: wp.array(dtype=int), table: wp.array(dtype=int),
-    raw: wp.array(dtype=wp.vec4), fill: wp.array(dtype=wp.vec4), dt: wp.array(dtype=float),
-    force: wp.array(dtype=Force), phases: wp.array2d(dtype=Phase),
+    grid: Grid,
+    lanes: int,
+    active: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4),
+    fill: wp.array(dtype=wp.vec4),
+    dt: wp.array(dtype=float),
+    force: wp.array(dtype=Force),
+    phases: wp.array2d(dtype=Phase),
     # outputs
     moving: wp.array(dtype=wp.vec4),
-):  # fmt: skip
+):
     """Velocity of every node from momentum, gravity and walls; the fourth component is its density [kg/m^3], or, where
     matter expands, the density that fresh matter of the same rest volume would have. `fill` is `raw` where it does not.
 
@@ -245,13 +294,25 @@ class Feedback:
 
 @wp.kernel
 def g2p(
-    grid: Grid, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), moving: wp.array(dtype=wp.vec4),
-    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int), feedback: Feedback,
+    grid: Grid,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    moving: wp.array(dtype=wp.vec4),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    feedback: Feedback,
     # outputs
-    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), affine: wp.array(dtype=wp.mat33),
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+    affine: wp.array(dtype=wp.mat33),
     volume_ratio: wp.array(dtype=float),
-    table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), fault: wp.array(dtype=int),
-):  # fmt: skip
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
     """Velocity and affine velocity field of each particle from its 27 nodes (Jiang et al. 2015), then its motion."""
     p = wp.tid()
     world = p / capacity
@@ -321,11 +382,13 @@ def passes(expands: bool) -> SimpleNamespace:
     options = {"fast_math": True, "enable_backward": False}
     special = {
         law.__name__: wp.kernel(
-            rebound(law, {"EXPANDS": expands}), name=f"{law.__name__}_{'expanding' if expands else 'plain'}",
-            module="unique", module_options=options,
+            rebound(law, {"EXPANDS": expands}),
+            name=f"{law.__name__}_{'expanding' if expands else 'plain'}",
+            module="unique",
+            module_options=options,
         )
         for law in (p2g, grid_step)
-    }  # fmt: skip
+    }
     return SimpleNamespace(
         reset_blocks=reset_blocks, find_blocks=find_blocks, clear_grid=clear_grid, g2p=g2p, **special
     )

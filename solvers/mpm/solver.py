@@ -8,21 +8,25 @@ import numpy as np
 import warp as wp
 from pydantic import Field
 
-from fluidbench.particles import Pool
+from fluidbench.method.contract import Config, Economy, NumericalAxis
+from fluidbench.method.features import Feature
+from fluidbench.method.target import BACKENDS
+from fluidbench.method.timestep import Bound, damped_limit
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import Scene
+from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
-from fluidbench.scene import Scene
-from fluidbench.solver import Config, Feature, Solver
-from fluidbench.target import BACKENDS
-from fluidbench.timestep import Bound, damped_limit
 
 from .. import aging
 from ..backends import backend_of
 from ..constitutive import STRETCHED
 from ..order import CellOrder
-from ..readout import present_density, shear_stress
+from ..readout import present_density, pressures, shear_stress
+from ..theory import mpm_numbers, stable_dt
 from . import kernels_warp as kernels
-from .grid import FAULT_BLOCKS, cells_of, grid_of
+from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
 
+NODE: Any = wp.vec4  # momentum and mass of a grid node
 ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
 ISOLATED_VISCOUS = 0.25
 
@@ -42,6 +46,7 @@ class SolverMPM(Solver):
     """MLS-MPM with APIC transfers, quadratic B-splines, symplectic Euler, on a block-sparse grid."""
 
     name = "mpm"
+    rank = 1
     paradigm = "hybrid: particles carry state, a background grid carries momentum"
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
@@ -53,6 +58,31 @@ class SolverMPM(Solver):
     }
 
     typical_rate, typical_bytes = 3.5e6, 2500.0
+    axes: ClassVar = (NumericalAxis("particles_per_cell", "grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-", 1 / 3),)
+
+    @classmethod
+    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
+        blocks = blocks_of(scenario.domain, config.grid_ratio * scenario.spacing)
+        if blocks <= MAX_BLOCKS:
+            return None
+        return f"the domain holds {blocks:.3g} grid blocks; use a smaller domain or a larger spacing"
+
+    @classmethod
+    def memory(cls, scenario: Scenario, config: Any, particles: int) -> float:
+        index = 4.0 * blocks_of(scenario.domain, config.grid_ratio * scenario.spacing)  # of every block, used or not
+        return super().memory(scenario, config, particles) + index
+
+    @classmethod
+    def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
+        return [
+            Economy("coarser grid", {"grid_ratio": round(min(1.33 * config.grid_ratio, 4.0), 3)}),
+            Economy("larger dt", {"safety": 1.0}),
+            Economy("no volume feedback", {"volume_feedback": 0.0}),
+        ]
+
+    @classmethod
+    def theory(cls, scenario: Scenario, config: Any) -> float:
+        return stable_dt(cls, scenario, config, *mpm_numbers(config.safety))
 
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
@@ -62,12 +92,14 @@ class SolverMPM(Solver):
         viscous = ISOLATED_VISCOUS * dx * dx / nu if nu > 0 else math.inf
         a = config.safety
         limits = [
-            Bound("acoustic", a * acoustic, f"{a:g} dx / (sqrt(3) (c + v))", "validation H: isolated particle, exact"),
+            Bound(
+                "acoustic", a * acoustic, f"{a:g} dx / (sqrt(3) (c + v))", "references.md, H: isolated particle, exact"
+            ),
             Bound("advective", config.advection * dx / max(speed, 1e-12), f"{config.advection:g} dx / v", "one cell"),
         ]
         if nu > 0:
             limits += [
-                Bound("viscous", a * viscous, f"{a:g} dx^2 / (4 nu)", "validation H: isolated particle, exact"),
+                Bound("viscous", a * viscous, f"{a:g} dx^2 / (4 nu)", "references.md, H: isolated particle, exact"),
                 Bound(
                     "acoustic-viscous",
                     a * damped_limit(acoustic, viscous),
@@ -96,9 +128,9 @@ class SolverMPM(Solver):
             self.table = wp.zeros(blocks, dtype=int)
             self.block_of = wp.zeros(slots, dtype=int)
             self.active = wp.zeros(1, dtype=int)
-            self.raw = wp.empty(slots * 64, dtype=wp.vec4)
-            self.moving = wp.empty(slots * 64, dtype=wp.vec4)
-            self.fill = wp.empty(slots * 64, dtype=wp.vec4) if scene.expands else self.raw
+            self.raw = wp.empty(slots * 64, dtype=NODE)
+            self.moving = wp.empty(slots * 64, dtype=NODE)
+            self.fill = wp.empty(slots * 64, dtype=NODE) if scene.expands else self.raw
         self.started = False
         self.order = CellOrder(
             scene, pool, np.array(self.grid.dx), shift=0.5
@@ -118,9 +150,11 @@ class SolverMPM(Solver):
         self._launch("reset_blocks", self.node_lanes, [self.table, self.block_of, self.active, self.node_lanes])
         self.active.zero_()
         self._launch(
-            "find_blocks", pool.size, [self.grid, pool.capacity, pool.count, pool.position],
+            "find_blocks",
+            pool.size,
+            [self.grid, pool.capacity, pool.count, pool.position],
             [self.table, self.block_of, self.active, pool.fault],
-        )  # fmt: skip
+        )
         if not self.started:
             self._start_affine()
 
@@ -174,32 +208,72 @@ class SolverMPM(Solver):
         self._launch(
             "p2g",
             pool.size,
-            [self.grid, pool.capacity, pool.count, scene.dt, scene.phases, pool.position, pool.velocity, pool.affine,
-             pool.mass, pool.volume, pool.phase, pool.held, self.table],
+            [
+                self.grid,
+                pool.capacity,
+                pool.count,
+                scene.dt,
+                scene.phases,
+                pool.position,
+                pool.velocity,
+                pool.affine,
+                pool.mass,
+                pool.volume,
+                pool.phase,
+                pool.held,
+                self.table,
+            ],
             [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, self.fill, pool.fault],
             block_dim=128,
-        )  # fmt: skip
+        )
 
     def grid_step(self) -> None:
         scene = self.scene
         self._launch(
             "grid_step",
             self.node_lanes,
-            [self.grid, self.node_lanes, self.active, self.block_of, self.table, self.raw, self.fill, scene.dt,
-             scene.force, scene.phases],
+            [
+                self.grid,
+                self.node_lanes,
+                self.active,
+                self.block_of,
+                self.table,
+                self.raw,
+                self.fill,
+                scene.dt,
+                scene.force,
+                scene.phases,
+            ],
             [self.moving],
-        )  # fmt: skip
+        )
 
     def g2p(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
             "g2p",
             pool.size,
-            [self.grid, pool.capacity, pool.count, scene.dt, self.moving, scene.phases, pool.phase, pool.held,
-             self.feedback],
-            [pool.position, pool.velocity, pool.affine, pool.volume_ratio, self.table, self.block_of, self.active,
-             pool.fault],
-        )  # fmt: skip
+            [
+                self.grid,
+                pool.capacity,
+                pool.count,
+                scene.dt,
+                self.moving,
+                scene.phases,
+                pool.phase,
+                pool.held,
+                self.feedback,
+            ],
+            [
+                pool.position,
+                pool.velocity,
+                pool.affine,
+                pool.volume_ratio,
+                self.table,
+                self.block_of,
+                self.active,
+                pool.fault,
+            ],
+        )
 
     def prepare(self) -> None:
         if self.scene.changes:
@@ -222,6 +296,9 @@ class SolverMPM(Solver):
         c = self.pool.affine.numpy() * (0.25 * np.array(self.grid.dx) ** 2)
         turn = np.stack([c[:, 2, 1] - c[:, 1, 2], c[:, 0, 2] - c[:, 2, 0], c[:, 1, 0] - c[:, 0, 1]], axis=1)
         return self.pool.mass.numpy()[:, None] * turn
+
+    def pressures(self) -> np.ndarray:
+        return pressures(self.scene, self.pool, self.densities())
 
     def shear_stresses(self) -> np.ndarray | None:
         return shear_stress(self.scene, self.pool)

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, STICK
+from fluidbench.native.scene import FRICTION, PERIODIC, STICK
 
 from .grid import FIRST, Grid, raw_node
 
@@ -14,9 +14,14 @@ CONTACT_BEGINS, CONTACT_ENDS = wp.constant(0.5), wp.constant(0.7)
 
 @wp.func
 def grip(
-    grid: Grid, world: int, node: wp.vec3i, axis: int, rest_density: float, table: wp.array(dtype=int),
+    grid: Grid,
+    world: int,
+    node: wp.vec3i,
+    axis: int,
+    rest_density: float,
+    table: wp.array(dtype=int),
     raw: wp.array(dtype=wp.vec4),
-):  # fmt: skip
+):
     """How far, from 0 to 1, the wall nearest to a node on this axis acts on its column of nodes.
 
     Slip walls always act: they are symmetry planes. Rough walls act where material has arrived, as the node on the
@@ -81,7 +86,7 @@ def wall_kind(node: int, lower_kind: int, upper_kind: int, cells: int):
 
 
 @wp.func
-def rub(v: wp.vec3, axis: int, outward: float, friction: float):
+def wall_friction(v: wp.vec3, axis: int, outward: float, friction: float):
     """Unilateral contact with Coulomb friction: no motion into the wall, tangential loss up to friction times that."""
     out = v
     into = outward * v[axis]
@@ -110,7 +115,7 @@ def wall_velocity(grid: Grid, node: wp.vec3i, touching: wp.vec3i, v: wp.vec3):
             if kind == STICK:
                 out = wp.vec3(0.0, 0.0, 0.0)
             elif kind == FRICTION:
-                out = rub(out, axis, outward, friction)
+                out = wall_friction(out, axis, outward, friction)
             else:
                 out[axis] = 0.0
     return out

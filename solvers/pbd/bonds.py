@@ -10,8 +10,9 @@ from typing import Any
 
 import warp as wp
 
-from fluidbench.particles import CARRIED, CLAMPED, FREE, Pool
-from fluidbench.scene import PERIODIC, SLIP, STICK, Box, Phase, Scene, is_solid
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import PERIODIC, SLIP, STICK, Box, Phase, Scene, is_solid
 
 from ..backends import Backend
 from ..bind import warp_func
@@ -89,11 +90,18 @@ def mirrors_only(box: Box, code: int):
 
 @wp.kernel
 def awaken(
-    box: Box, spacing: float, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase),
-    phase_of: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), bonds: Bonds,
+    box: Box,
+    spacing: float,
+    capacity: int,
+    count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    bonds: Bonds,
     # outputs
-    held: wp.array(dtype=int), velocity: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+    held: wp.array(dtype=int),
+    velocity: wp.array(dtype=wp.vec3),
+):
     """Particles that have just come free may bond in this substep; those on a stick wall become part of it."""
     i = wp.tid()
     world = i / capacity
@@ -124,11 +132,16 @@ def add_bond(bonds: Bonds, i: int, partner: int, rest: float, fault: wp.array(dt
 
 @wp.kernel
 def bind(
-    box: Box, spacing: float, lists: Lists, capacity: int, count: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), bonds: Bonds,
+    box: Box,
+    spacing: float,
+    lists: Lists,
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    bonds: Bonds,
     # outputs
     fault: wp.array(dtype=int),
-):  # fmt: skip
+):
     """Bond fresh particles to all that are free around them; an older partner is told."""
     i = wp.tid()
     if i % capacity < count[i / capacity] and bonds.state[i] == FRESH:
@@ -146,12 +159,21 @@ def bind(
 
 @wp.kernel
 def stretch(
-    box: Box, spacing: float, sweep: int, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), bonds: Bonds,
+    box: Box,
+    spacing: float,
+    sweep: int,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    bonds: Bonds,
     # outputs
     correction: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     """One damped Jacobi sweep over all bonds (eq. 18 of the paper); both ends of a bond compute the same multiplier."""
     i = wp.tid()
     world = i / capacity
@@ -187,9 +209,15 @@ def stretch(
 
 @wp.kernel
 def relieve(
-    capacity: int, count: wp.array(dtype=int), box: Box, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int),
-    due: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), bonds: Bonds,
-):  # fmt: skip
+    capacity: int,
+    count: wp.array(dtype=int),
+    box: Box,
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    due: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    bonds: Bonds,
+):
     """Bonds of what stiffens keep their force: the rest length moves towards the present one as k / k'."""
     i = wp.tid()
     world = i / capacity
@@ -208,9 +236,14 @@ def relieve(
 
 @wp.kernel
 def yield_bonds(
-    capacity: int, count: wp.array(dtype=int), box: Box, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), bonds: Bonds,
-):  # fmt: skip
+    capacity: int,
+    count: wp.array(dtype=int),
+    box: Box,
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    bonds: Bonds,
+):
     """Perfect plasticity: a bond stretched or shortened beyond the yield strain takes on the length that it has, but
     for that strain. In uniaxial stress it is sqrt(3) tau_y / E."""
     i = wp.tid()
@@ -248,38 +281,56 @@ class Network:
         pool, scene = self.pool, self.scene
         common = [scene.box, scene.spacing]
         self.backend.launch(
-            self.kernels.awaken, pool.size,
+            self.kernels.awaken,
+            pool.size,
             [*common, pool.capacity, pool.count, scene.phases, pool.phase, pool.position, self.bonds],
             [pool.held, pool.velocity],
-        )  # fmt: skip
+        )
         self.backend.launch(
-            self.kernels.bind, pool.size, [*common, lists, pool.capacity, pool.count, pool.position, self.bonds],
+            self.kernels.bind,
+            pool.size,
+            [*common, lists, pool.capacity, pool.count, pool.position, self.bonds],
             [pool.fault],
-        )  # fmt: skip
+        )
 
     def stretch(self, sweep: int, correction: wp.array) -> None:
         pool, scene = self.pool, self.scene
         self.backend.launch(
-            self.kernels.stretch, pool.size,
-            [scene.box, scene.spacing, sweep, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase, pool.held,
-             pool.position, pool.mass, self.bonds],
+            self.kernels.stretch,
+            pool.size,
+            [
+                scene.box,
+                scene.spacing,
+                sweep,
+                pool.capacity,
+                pool.count,
+                scene.dt,
+                scene.phases,
+                pool.phase,
+                pool.held,
+                pool.position,
+                pool.mass,
+                self.bonds,
+            ],
             [correction],
-        )  # fmt: skip
+        )
 
     def relieve(self, due: wp.array) -> None:
         pool, scene = self.pool, self.scene
         wp.launch(
-            relieve, pool.size,
+            relieve,
+            pool.size,
             [pool.capacity, pool.count, scene.box, scene.phases, pool.phase, due, pool.position, self.bonds],
             device=scene.device,
-        )  # fmt: skip
+        )
 
     def flow(self) -> None:
         pool, scene = self.pool, self.scene
         self.backend.launch(
-            self.kernels.yield_bonds, pool.size,
+            self.kernels.yield_bonds,
+            pool.size,
             [pool.capacity, pool.count, scene.box, scene.phases, pool.phase, pool.position, self.bonds],
-        )  # fmt: skip
+        )
 
     def carried(self) -> dict[str, Any]:
         return {f"bonds.{name}": getattr(self.bonds, name) for name in Bonds.vars}

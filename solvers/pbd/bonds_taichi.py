@@ -2,8 +2,8 @@
 
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, CLAMPED, FREE
-from fluidbench.scene import PERIODIC, SLIP, STICK
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.scene import PERIODIC, SLIP, STICK
 
 from ..neighbours import INDEX_BITS, INDEX_MASK
 from ..neighbours_taichi import BoxT, ListsT, digit, face_kind, image_position
@@ -54,10 +54,21 @@ def holding(box, code):
 
 @ti.kernel
 def awaken(
-    box: BoxT, spacing: float, capacity: int, count: Ints, phases: Phases, phase_of: Ints, position: Vectors,
-    number: Ints, partner: Ints, rest: Floats, multiplier: Floats, state: Ints,
-    held: Ints, velocity: Vectors,
-):  # fmt: skip
+    box: BoxT,
+    spacing: float,
+    capacity: int,
+    count: Ints,
+    phases: Phases,
+    phase_of: Ints,
+    position: Vectors,
+    number: Ints,
+    partner: Ints,
+    rest: Floats,
+    multiplier: Floats,
+    state: Ints,
+    held: Ints,
+    velocity: Vectors,
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -80,7 +91,7 @@ def awaken(
 @ti.func
 def add_bond(
     i, other, length, number: ti.template(), partner: ti.template(), rest: ti.template(), fault: ti.template()
-):  # fmt: skip
+):
     k = ti.atomic_add(number[i], 1)
     if k < ROOM:
         partner[k * number.shape[0] + i] = other
@@ -92,11 +103,21 @@ def add_bond(
 
 @ti.kernel
 def bind(
-    box: BoxT, spacing: float, lists: ListsT, entries: Ints, listed: Ints, capacity: int, count: Ints,
+    box: BoxT,
+    spacing: float,
+    lists: ListsT,
+    entries: Ints,
+    listed: Ints,
+    capacity: int,
+    count: Ints,
     position: Vectors,
-    number: Ints, partner: Ints, rest: Floats, multiplier: Floats, state: Ints,
+    number: Ints,
+    partner: Ints,
+    rest: Floats,
+    multiplier: Floats,
+    state: Ints,
     fault: Ints,
-):  # fmt: skip
+):
     for i in range(position.shape[0]):
         if i % capacity < count[i // capacity] and state[i] == FRESH:
             for k in range(listed[i]):
@@ -112,11 +133,24 @@ def bind(
 
 @ti.kernel
 def stretch(
-    box: BoxT, spacing: float, sweep: int, capacity: int, count: Ints, dt: Floats, phases: Phases, phase_of: Ints,
-    held: Ints, position: Vectors, mass: Floats,
-    number: Ints, partner: Ints, rest: Floats, multiplier: Floats, state: Ints,
+    box: BoxT,
+    spacing: float,
+    sweep: int,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    phases: Phases,
+    phase_of: Ints,
+    held: Ints,
+    position: Vectors,
+    mass: Floats,
+    number: Ints,
+    partner: Ints,
+    rest: Floats,
+    multiplier: Floats,
+    state: Ints,
     correction: Vectors,
-):  # fmt: skip
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -140,9 +174,18 @@ def stretch(
 
 @ti.kernel
 def yield_bonds(
-    capacity: int, count: Ints, box: BoxT, phases: Phases, phase_of: Ints, position: Vectors,
-    number: Ints, partner: Ints, rest: Floats, multiplier: Floats, state: Ints,
-):  # fmt: skip
+    capacity: int,
+    count: Ints,
+    box: BoxT,
+    phases: Phases,
+    phase_of: Ints,
+    position: Vectors,
+    number: Ints,
+    partner: Ints,
+    rest: Floats,
+    multiplier: Floats,
+    state: Ints,
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:

@@ -3,8 +3,9 @@ equations."""
 
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, FAULT_ASTRAY, FREE
-from fluidbench.scene import FRICTION, PERIODIC, STICK
+from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.pool import FAULT_ASTRAY
+from fluidbench.native.scene import FRICTION, PERIODIC, STICK
 
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
 from ..flow_taichi import strained
@@ -72,9 +73,18 @@ def seen_moving(box, velocity: ti.template(), entry):
 
 @ti.kernel
 def predict(
-    num: NumbersT, box: BoxT, capacity: int, count: Ints, dt: Floats, force: Forces, held: Ints, velocity: Vectors,
-    position: Vectors, motion: Vectors, fault: Ints,
-):  # fmt: skip
+    num: NumbersT,
+    box: BoxT,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    force: Forces,
+    held: Ints,
+    velocity: Vectors,
+    position: Vectors,
+    motion: Vectors,
+    fault: Ints,
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -90,10 +100,20 @@ def predict(
 
 @ti.kernel
 def multipliers(
-    num: NumbersT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, phases: Phases,
-    phase_of: Ints, position: Vectors, volume: Floats,
-    multiplier: Floats, fill: Floats,
-):  # fmt: skip
+    num: NumbersT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    capacity: int,
+    count: Ints,
+    phases: Phases,
+    phase_of: Ints,
+    position: Vectors,
+    volume: Floats,
+    multiplier: Floats,
+    fill: Floats,
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -116,10 +136,19 @@ def multipliers(
 
 @ti.kernel
 def correct(
-    num: NumbersT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, held: Ints,
-    position: Vectors, volume: Floats, multiplier: Floats,
+    num: NumbersT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    capacity: int,
+    count: Ints,
+    held: Ints,
+    position: Vectors,
+    volume: Floats,
+    multiplier: Floats,
     correction: Vectors,
-):  # fmt: skip
+):
     for i in range(position.shape[0]):
         if i % capacity < count[i // capacity] and held[i] == FREE:
             shift = vec3(0.0)
@@ -134,9 +163,16 @@ def correct(
 
 @ti.kernel
 def apply(
-    num: NumbersT, box: BoxT, capacity: int, count: Ints, held: Ints, correction: Vectors,
-    position: Vectors, motion: Vectors, fault: Ints,
-):  # fmt: skip
+    num: NumbersT,
+    box: BoxT,
+    capacity: int,
+    count: Ints,
+    held: Ints,
+    correction: Vectors,
+    position: Vectors,
+    motion: Vectors,
+    fault: Ints,
+):
     for i in range(position.shape[0]):
         if i % capacity < count[i // capacity] and held[i] == FREE:
             shift = correction[i]
@@ -162,10 +198,25 @@ def velocities(capacity: int, count: Ints, dt: Floats, held: Ints, motion: Vecto
 
 @ti.kernel
 def strain(
-    num: NumbersT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, dt: Floats,
-    phases: Phases, phase_of: Ints, held: Ints, position: Vectors, mass: Floats, volume: Floats, velocity: Vectors,
-    elastic_normal: Vectors, elastic_shear: Vectors, stress: Matrices,
-):  # fmt: skip
+    num: NumbersT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    phases: Phases,
+    phase_of: Ints,
+    held: Ints,
+    position: Vectors,
+    mass: Floats,
+    volume: Floats,
+    velocity: Vectors,
+    elastic_normal: Vectors,
+    elastic_shear: Vectors,
+    stress: Matrices,
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -194,10 +245,22 @@ def strain(
 
 @ti.kernel
 def pull(
-    num: NumbersT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, dt: Floats,
-    held: Ints, position: Vectors, mass: Floats, volume: Floats, stress: Matrices, velocity: Vectors,
+    num: NumbersT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    held: Ints,
+    position: Vectors,
+    mass: Floats,
+    volume: Floats,
+    stress: Matrices,
+    velocity: Vectors,
     smoothed: Vectors,
-):  # fmt: skip
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -222,10 +285,23 @@ def pull(
 
 @ti.kernel
 def shear(
-    num: NumbersT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, dt: Floats,
-    phases: Phases, phase_of: Ints, held: Ints, position: Vectors, mass: Floats, volume: Floats, velocity: Vectors,
+    num: NumbersT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    phases: Phases,
+    phase_of: Ints,
+    held: Ints,
+    position: Vectors,
+    mass: Floats,
+    volume: Floats,
+    velocity: Vectors,
     smoothed: Vectors,
-):  # fmt: skip
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -246,17 +322,25 @@ def shear(
 
 
 @ti.func
-def rubs(kind, gap, spacing, solid):
-    """Whether a particle this far from a face rubs on it."""
+def wall_friction_acts(kind, gap, spacing, solid):
+    """Whether a particle this far from a face feels its friction."""
     return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
 
 
 @ti.kernel
-def rub(
-    box: BoxT, capacity: int, count: Ints, dt: Floats, held: Ints, spacing: float, phases: Phases, phase_of: Ints,
-    force: Forces, position: Vectors,
+def wall_friction(
+    box: BoxT,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    held: Ints,
+    spacing: float,
+    phases: Phases,
+    phase_of: Ints,
+    force: Forces,
+    position: Vectors,
     velocity: Vectors,
-):  # fmt: skip
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world] and held[i] == FREE:
@@ -264,8 +348,8 @@ def rub(
             solid = bonded(phase_at(phases, world, phase_of[i]))
             weight = force_at(force, world, x)
             for axis in ti.static(range(3)):
-                low = rubs(box.lower_kind[axis], x[axis] - box.lower[axis], spacing, solid)
-                high = rubs(box.upper_kind[axis], box.upper[axis] - x[axis], spacing, solid)
+                low = wall_friction_acts(box.lower_kind[axis], x[axis] - box.lower[axis], spacing, solid)
+                high = wall_friction_acts(box.upper_kind[axis], box.upper[axis] - x[axis], spacing, solid)
                 if low or high:
                     kind, friction = box.lower_kind[axis], box.lower_friction[axis]
                     if high:
@@ -283,6 +367,13 @@ def rub(
 
 
 PASSES = SimpleNamespace(
-    predict=predict, multipliers=multipliers, correct=correct, apply=apply, velocities=velocities, strain=strain,
-    pull=pull, shear=shear, rub=rub,
-)  # fmt: skip
+    predict=predict,
+    multipliers=multipliers,
+    correct=correct,
+    apply=apply,
+    velocities=velocities,
+    strain=strain,
+    pull=pull,
+    shear=shear,
+    wall_friction=wall_friction,
+)

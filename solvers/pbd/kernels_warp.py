@@ -10,8 +10,9 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.particles import CARRIED, FAULT_ASTRAY
-from fluidbench.scene import Box, Force, Phase, force_at, too_fast
+from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.pool import FAULT_ASTRAY
+from fluidbench.native.scene import Box, Force, Phase, force_at, too_fast
 
 from .. import constitutive
 from ..aging import rest_density
@@ -21,7 +22,7 @@ from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET, Lists, contained, i
 from ..smoothing import poly6, spiky, spiky_slope
 from . import laws
 from .bonds import bonded
-from .walls import pushed, rub
+from .walls import pushed, wall_friction
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -56,11 +57,19 @@ class Numbers:
 
 @wp.kernel
 def predict(
-    num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    force: wp.array(dtype=Force), held: wp.array(dtype=int), velocity: wp.array(dtype=wp.vec3),
+    num: Numbers,
+    box: Box,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    force: wp.array(dtype=Force),
+    held: wp.array(dtype=int),
+    velocity: wp.array(dtype=wp.vec3),
     # outputs
-    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
-):  # fmt: skip
+    position: wp.array(dtype=wp.vec3),
+    motion: wp.array(dtype=wp.vec3),
+    fault: wp.array(dtype=int),
+):
     """Position under the present velocity and gravity. `motion` carries the displacement of the substep by itself: as a
     difference of float32 positions it would lose the velocity at small dt."""
     i = wp.tid()
@@ -68,7 +77,7 @@ def predict(
     if i - world * capacity < count[world]:
         h = dt[world]
         v = velocity[i]
-        if held[i] == 0:
+        if held[i] == FREE:
             v += h * force_at(force[world], position[i])
         free = position[i] + h * v
         if too_fast(v, HURRIED * box.top_speed):
@@ -80,11 +89,19 @@ def predict(
 
 @wp.kernel
 def multipliers(
-    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), phases: wp.array2d(dtype=Phase),
-    phase_of: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float),
+    num: Numbers,
+    box: Box,
+    lists: Lists,
+    capacity: int,
+    count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    volume: wp.array(dtype=float),
     # outputs
-    multiplier: wp.array(dtype=float), fill: wp.array(dtype=float),
-):  # fmt: skip
+    multiplier: wp.array(dtype=float),
+    fill: wp.array(dtype=float),
+):
     """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper).
 
     Density is summed with the kernel whose slope is used, so that the constraint and its gradient agree; the paper
@@ -122,14 +139,21 @@ def multipliers(
 
 @wp.kernel
 def correct(
-    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), volume: wp.array(dtype=float), multiplier: wp.array(dtype=float),
+    num: Numbers,
+    box: Box,
+    lists: Lists,
+    capacity: int,
+    count: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    volume: wp.array(dtype=float),
+    multiplier: wp.array(dtype=float),
     # outputs
     correction: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     """Position correction (eq. 12), as one simultaneous Jacobi step."""
     i = wp.tid()
-    if i % capacity < count[i / capacity] and held[i] == 0:
+    if i % capacity < count[i / capacity] and held[i] == FREE:
         x = position[i]
         shift = wp.vec3(0.0, 0.0, 0.0)
         for k in range(lists.number[i]):
@@ -148,14 +172,20 @@ def correct(
 
 @wp.kernel
 def apply(
-    num: Numbers, box: Box, capacity: int, count: wp.array(dtype=int), held: wp.array(dtype=int),
+    num: Numbers,
+    box: Box,
+    capacity: int,
+    count: wp.array(dtype=int),
+    held: wp.array(dtype=int),
     correction: wp.array(dtype=wp.vec3),
     # outputs
-    position: wp.array(dtype=wp.vec3), motion: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
-):  # fmt: skip
+    position: wp.array(dtype=wp.vec3),
+    motion: wp.array(dtype=wp.vec3),
+    fault: wp.array(dtype=int),
+):
     """Move by the correction, at most a quarter of a spacing, and stay inside the walls."""
     i = wp.tid()
-    if i % capacity < count[i / capacity] and held[i] == 0:
+    if i % capacity < count[i / capacity] and held[i] == FREE:
         shift = correction[i]
         length = wp.length(shift)
         limit = 0.25 * num.spacing
@@ -171,28 +201,41 @@ def apply(
 
 @wp.kernel
 def velocities(
-    capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    held: wp.array(dtype=int),
     motion: wp.array(dtype=wp.vec3),
     # outputs
     velocity: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     """v = displacement / dt."""
     i = wp.tid()
     world = i / capacity
-    if i - world * capacity < count[world] and held[i] == 0:
+    if i - world * capacity < count[world] and held[i] == FREE:
         velocity[i] = motion[i] / dt[world]
 
 
 @wp.kernel
 def strain(
-    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), volume: wp.array(dtype=float),
+    num: Numbers,
+    box: Box,
+    lists: Lists,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
     velocity: wp.array(dtype=wp.vec3),
     # outputs
-    elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
     stress: wp.array(dtype=wp.mat33),
-):  # fmt: skip
+):
     """Strain of the substep by the common material law, and the elastic deviator that answers it. There is no isotropic
     tension: density constraints only push."""
     i = wp.tid()
@@ -227,11 +270,28 @@ def strain(
         s = elastic_shear[i]
         if held[i] != CARRIED:
             b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                slope[0, 0], slope[0, 1], slope[0, 2], slope[1, 0], slope[1, 1], slope[1, 2], slope[2, 0], slope[2, 1],
-                slope[2, 2], b[0], b[1], b[2], s[0], s[1], s[2],
-                modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
-                phase.relaxation_rate, dt[world],
-            )  # fmt: skip
+                slope[0, 0],
+                slope[0, 1],
+                slope[0, 2],
+                slope[1, 0],
+                slope[1, 1],
+                slope[1, 2],
+                slope[2, 0],
+                slope[2, 1],
+                slope[2, 2],
+                b[0],
+                b[1],
+                b[2],
+                s[0],
+                s[1],
+                s[2],
+                modulus,
+                phase.yield_stress,
+                phase.plastic_viscosity,
+                phase.flow_index,
+                phase.relaxation_rate,
+                dt[world],
+            )
             b = wp.vec3(b_xx, b_yy, b_zz)
             s = wp.vec3(b_xy, b_xz, b_yz)
             elastic_normal[i] = b
@@ -241,12 +301,21 @@ def strain(
 
 @wp.kernel
 def pull(
-    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    held: wp.array(dtype=int), position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
-    volume: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33), velocity: wp.array(dtype=wp.vec3),
+    num: Numbers,
+    box: Box,
+    lists: Lists,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
+    stress: wp.array(dtype=wp.mat33),
+    velocity: wp.array(dtype=wp.vec3),
     # outputs
     smoothed: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     """Velocity under the stress of the particle and its neighbours, and damping along their lines of centres."""
     i = wp.tid()
     world = i / capacity
@@ -273,20 +342,29 @@ def pull(
             a += (own + other) * (g * r)
             w = volume[j] * num.weight * kernel(distance * distance, num.support)
             damping -= (w * wp.dot(v - vj, r) / wp.max(distance * distance, 1.0e-18)) * r
-        if held[i] == 0:
+        if held[i] == FREE:
             v += (dt[world] / rest_density(mass, volume, i)) * a + num.calm * damping
         smoothed[i] = v
 
 
 @wp.kernel
 def shear(
-    num: Numbers, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float), volume: wp.array(dtype=float),
+    num: Numbers,
+    box: Box,
+    lists: Lists,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
     velocity: wp.array(dtype=wp.vec3),
     # outputs
     smoothed: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     """One XSPH sweep (eq. 17)."""
     i = wp.tid()
     world = i / capacity
@@ -310,7 +388,7 @@ def shear(
             mean += w * (vj - v)
             total += w
         out = v
-        if held[i] == 0:
+        if held[i] == FREE:
             rest = rest_density(mass, volume, i)
             c = smoothing_weight(phase.viscosity, rest, dt[world], num.support, float(num.sweeps))
             out = v + (c / wp.max(total, 1.0)) * mean
@@ -318,6 +396,13 @@ def shear(
 
 
 PASSES = SimpleNamespace(
-    predict=predict, multipliers=multipliers, correct=correct, apply=apply, velocities=velocities, strain=strain,
-    pull=pull, shear=shear, rub=rub,
-)  # fmt: skip
+    predict=predict,
+    multipliers=multipliers,
+    correct=correct,
+    apply=apply,
+    velocities=velocities,
+    strain=strain,
+    pull=pull,
+    shear=shear,
+    wall_friction=wall_friction,
+)

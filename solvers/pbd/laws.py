@@ -2,7 +2,7 @@
 
 
 def largest_viscosity(density: float, dt: float, support: float, sweeps: float):
-    """The most that XSPH sweeps can stand for at this dt [Pa s]: rho sweeps H^2 / (22 dt) (validation C)."""
+    """The most that XSPH sweeps can stand for at this dt [Pa s]: rho sweeps H^2 / (22 dt) (references.md, C)."""
     return density * sweeps * support * support / (22.0 * dt)
 
 

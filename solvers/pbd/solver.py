@@ -8,12 +8,14 @@ import numpy as np
 import warp as wp
 from pydantic import Field
 
-from fluidbench.particles import Pool
+from fluidbench.method.contract import Config, Economy
+from fluidbench.method.features import Feature
+from fluidbench.method.target import BACKENDS
+from fluidbench.method.timestep import Bound
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import FRICTION, STICK, Scene
+from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
-from fluidbench.scene import FRICTION, STICK, Scene
-from fluidbench.solver import Config, Feature, Solver
-from fluidbench.target import BACKENDS
-from fluidbench.timestep import Bound
 
 from .. import aging
 from ..backends import backend_of
@@ -47,15 +49,16 @@ def largest_viscosity(scenario: Scenario, config: ConfigPBD, dt: float) -> float
     return laws.largest_viscosity(scenario.material.density, dt, support, config.shear_sweeps)
 
 
-STIFFEST = 0.5  # kappa in c_eff = kappa (d / dt) sqrt(sweeps), Jacobi (validation I)
+STIFFEST = 0.5  # kappa in c_eff = kappa (d / dt) sqrt(sweeps), Jacobi (references.md, I)
 
 
 class SolverPBD(Solver):
     """Position-based fluids: one-sided density constraints, compliant shear bounded by yield, bonds, XSPH viscosity."""
 
     name = "pbd"
+    rank = 3
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
-    features = frozenset(Feature) - {Feature.PRESSURE}
+    features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigPBD
     faults: ClassVar = {
@@ -63,11 +66,31 @@ class SolverPBD(Solver):
         bonds.FAULT_BONDS: "a particle of a solid has more than 48 neighbours to bond with; make the bodies less dense",
     }
     passes = (
-        "predict", "lists", "bind", "stretch", "multipliers", "correct", "apply", "velocities", "strain", "pull",
-        "shear", "rub",
-    )  # fmt: skip
+        "predict",
+        "lists",
+        "bind",
+        "stretch",
+        "multipliers",
+        "correct",
+        "apply",
+        "velocities",
+        "strain",
+        "pull",
+        "shear",
+        "wall_friction",
+    )
 
     typical_rate, typical_bytes = 1.2e5, 900.0
+    bounded = False
+
+    @classmethod
+    def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
+        found = [
+            Economy("fewer iterations", {"iterations": max(1, config.iterations // 2)}),
+            Economy("larger dt", {"advance": min(2.0 * config.advance, 1.0)}),
+            Economy("fewer neighbours", {"support_ratio": 2.0}),
+        ]
+        return [*found, *([Economy("fewer sweeps", {"shear_sweeps": 4})] if scenario.material.viscosity > 0 else [])]
 
     @classmethod
     def usual_dt(cls, scenario: Scenario, config: Any) -> float:
@@ -115,7 +138,7 @@ class SolverPBD(Solver):
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
         d, g = scenario.spacing, scenario.peak_acceleration
         a = config.advance
-        limits = [Bound("accuracy", a * d / max(speed, 1e-12), f"{a:g} d / v", "validation H: no stability bound")]
+        limits = [Bound("accuracy", a * d / max(speed, 1e-12), f"{a:g} d / v", "references.md, H: no stability bound")]
         if g > 0:
             limits.append(Bound("free fall", (a * d / g) ** 0.5, f"sqrt({a:g} d / |g|)", "same, from rest"))
         return limits
@@ -131,7 +154,7 @@ class SolverPBD(Solver):
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
         self.num.sweeps = config.shear_sweeps
         kinds = (*scene.box.lower_kind, *scene.box.upper_kind)
-        self.rubs = FRICTION in kinds or (bonds.needed(scene) and STICK in kinds)
+        self.wall_friction_acts = FRICTION in kinds or (bonds.needed(scene) and STICK in kinds)
         self.num.calm = config.calm
         self.num.stiffness = config.shear_stiffness
         if scene.flowing:
@@ -184,8 +207,8 @@ class SolverPBD(Solver):
         if self.scene.viscous:
             for _ in range(self.config.shear_sweeps):
                 self.shear()
-        if self.rubs:
-            self.rub()
+        if self.wall_friction_acts:
+            self.wall_friction()
 
     def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
         self.backend.launch(kernel, self.pool.size, inputs, outputs)
@@ -195,9 +218,12 @@ class SolverPBD(Solver):
 
     def swell(self) -> None:
         wp.launch(
-            aging.swell, self.pool.size, [*self._active(), self.scene.dt, self.pool.growth], [self.pool.volume],
+            aging.swell,
+            self.pool.size,
+            [*self._active(), self.scene.dt, self.pool.growth],
+            [self.pool.volume],
             device=self.scene.device,
-        )  # fmt: skip
+        )
 
     def harden(self, due: wp.array) -> None:
         pool, flowing = self.pool, self.scene.flowing
@@ -205,9 +231,12 @@ class SolverPBD(Solver):
         if self.network is not None:
             self.network.relieve(due)
         wp.launch(
-            aging.harden, pool.size, [int(flowing), *self._active(), self.scene.phases, due], [pool.phase, *tensor],
+            aging.harden,
+            pool.size,
+            [int(flowing), *self._active(), self.scene.phases, due],
+            [pool.phase, *tensor],
             device=self.scene.device,
-        )  # fmt: skip
+        )
 
     def predict(self) -> None:
         pool, scene = self.pool, self.scene
@@ -240,10 +269,18 @@ class SolverPBD(Solver):
         pool = self.pool
         self._launch(
             self.kernels.correct,
-            [self.num, self.scene.box, self.pairs, *self._active(), pool.held, pool.position, pool.volume,
-             self.multiplier],
+            [
+                self.num,
+                self.scene.box,
+                self.pairs,
+                *self._active(),
+                pool.held,
+                pool.position,
+                pool.volume,
+                self.multiplier,
+            ],
             [self.correction],
-        )  # fmt: skip
+        )
 
     def apply(self) -> None:
         pool = self.pool
@@ -265,39 +302,83 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         self._launch(
             self.kernels.strain,
-            [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
-             pool.position, pool.mass, pool.volume, pool.velocity],
+            [
+                self.num,
+                scene.box,
+                self.pairs,
+                *self._active(),
+                scene.dt,
+                scene.phases,
+                pool.phase,
+                pool.held,
+                pool.position,
+                pool.mass,
+                pool.volume,
+                pool.velocity,
+            ],
             [pool.elastic_normal, pool.elastic_shear, self.stress],
-        )  # fmt: skip
+        )
 
     def pull(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
             self.kernels.pull,
-            [self.num, scene.box, self.pairs, *self._active(), scene.dt, pool.held, pool.position, pool.mass,
-             pool.volume, self.stress, pool.velocity],
+            [
+                self.num,
+                scene.box,
+                self.pairs,
+                *self._active(),
+                scene.dt,
+                pool.held,
+                pool.position,
+                pool.mass,
+                pool.volume,
+                self.stress,
+                pool.velocity,
+            ],
             [self.smoothed],
-        )  # fmt: skip
+        )
         wp.copy(pool.velocity, self.smoothed)
 
     def shear(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
             self.kernels.shear,
-            [self.num, scene.box, self.pairs, *self._active(), scene.dt, scene.phases, pool.phase, pool.held,
-             pool.position, pool.mass, pool.volume, pool.velocity],
+            [
+                self.num,
+                scene.box,
+                self.pairs,
+                *self._active(),
+                scene.dt,
+                scene.phases,
+                pool.phase,
+                pool.held,
+                pool.position,
+                pool.mass,
+                pool.volume,
+                pool.velocity,
+            ],
             [self.smoothed],
-        )  # fmt: skip
+        )
         wp.copy(pool.velocity, self.smoothed)
 
-    def rub(self) -> None:
+    def wall_friction(self) -> None:
         pool, scene = self.pool, self.scene
         self._launch(
-            self.kernels.rub,
-            [scene.box, *self._active(), scene.dt, pool.held, scene.spacing, scene.phases, pool.phase, scene.force,
-             pool.position],
+            self.kernels.wall_friction,
+            [
+                scene.box,
+                *self._active(),
+                scene.dt,
+                pool.held,
+                scene.spacing,
+                scene.phases,
+                pool.phase,
+                scene.force,
+                pool.position,
+            ],
             [pool.velocity],
-        )  # fmt: skip
+        )
 
     def prepare(self) -> None:
         if self.scene.changes:

@@ -1,8 +1,9 @@
-"""Walls of PBD beyond mirror images: how far they push, and how they rub."""
+"""Walls of PBD beyond mirror images: how far they push, and what friction they exert."""
 
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
+from fluidbench.method.frame import FREE
+from fluidbench.native.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
 
 from .bonds import bonded
 
@@ -21,22 +22,30 @@ def pushed(box: Box, free: wp.vec3, inside: wp.vec3):
 
 @wp.func
 def rubbing(kind: int, gap: float, spacing: float, solid: bool):
-    """Whether a particle this far from a face rubs on it: stick walls hold the viscous by its images, solids here."""
+    """Whether a particle this far from a face feels its friction: stick walls hold the viscous by its images, solids
+    here."""
     return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
 
 
 @wp.kernel
-def rub(
-    box: Box, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float), held: wp.array(dtype=int),
-    spacing: float, phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
+def wall_friction(
+    box: Box,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    held: wp.array(dtype=int),
+    spacing: float,
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    force: wp.array(dtype=Force),
     position: wp.array(dtype=wp.vec3),
     # outputs
     velocity: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     """Particles touching a friction wall lose tangential speed by Coulomb's law; solids on a stick wall all of it."""
     i = wp.tid()
     world = i / capacity
-    if i - world * capacity < count[world] and held[i] == 0:
+    if i - world * capacity < count[world] and held[i] == FREE:
         v = velocity[i]
         x = position[i]
         solid = bonded(phases[world, phase_of[i]])

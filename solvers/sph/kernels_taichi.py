@@ -4,8 +4,9 @@ equations."""
 import functools
 from types import SimpleNamespace
 
-from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE, FREE
-from fluidbench.scene import FRICTION, PERIODIC
+from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
+from fluidbench.native.scene import FRICTION, PERIODIC
 
 from ..aging import DISORDER
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
@@ -50,10 +51,25 @@ SmoothingT = struct_of(Smoothing)
 
 @ti.kernel
 def move(
-    box: BoxT, spacing: float, capacity: int, count: Ints, dt: Floats, phases: Phases, phase_of: Ints, force: Forces,
-    held: Ints, mass: Floats, volume: Floats, acceleration: Vectors, new_density: Floats,
-    position: Vectors, velocity: Vectors, density: Floats, lift: Vectors, fault: Ints,
-):  # fmt: skip
+    box: BoxT,
+    spacing: float,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    phases: Phases,
+    phase_of: Ints,
+    force: Forces,
+    held: Ints,
+    mass: Floats,
+    volume: Floats,
+    acceleration: Vectors,
+    new_density: Floats,
+    position: Vectors,
+    velocity: Vectors,
+    density: Floats,
+    carried_gradient: Vectors,
+    fault: Ints,
+):
     for i in range(position.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
@@ -64,7 +80,7 @@ def move(
                 phase = phase_at(phases, world, phase_of[i])
                 weight = force_at(force, world, position[i]) - acceleration[i]
                 carried = 0.5 * rest * rest / phase.bulk_modulus * weight
-            lift[i] = carried
+            carried_gradient[i] = carried
             free = position[i] + h * v
             if too_fast(v, box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
@@ -102,12 +118,31 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
 
     @ti.kernel
     def strain(
-        num: SmoothingT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, dt: Floats,
-        phases: Phases, phase_of: Ints, held: Ints, position: Vectors, velocity: Vectors, mass: Floats, volume: Floats,
-        density: Floats, lift: Vectors,
-        elastic_normal: Vectors, elastic_shear: Vectors, new_density: Floats, load: Floats, stress: Matrices,
-        rate: Matrices, fault: Ints,
-    ):  # fmt: skip
+        num: SmoothingT,
+        box: BoxT,
+        lists: ListsT,
+        entries: Ints,
+        number: Ints,
+        capacity: int,
+        count: Ints,
+        dt: Floats,
+        phases: Phases,
+        phase_of: Ints,
+        held: Ints,
+        position: Vectors,
+        velocity: Vectors,
+        mass: Floats,
+        volume: Floats,
+        density: Floats,
+        carried_gradient: Vectors,
+        elastic_normal: Vectors,
+        elastic_shear: Vectors,
+        new_density: Floats,
+        pressure_term: Floats,
+        stress: Matrices,
+        rate: Matrices,
+        fault: Ints,
+    ):
         for i in range(position.shape[0]):
             world = i // capacity
             if i - world * capacity < count[world]:
@@ -117,24 +152,24 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     rest = rest_density(mass, volume, i)
                     sound *= ti.sqrt(phase.density / rest)
                 approach, spread, second = 0.0, 0.0, 0.0
-                lean = vec3(0.0)
+                first_moment = vec3(0.0)
                 gradient, moment = mat3(0.0), mat3(0.0)
                 for k in range(number[i]):
                     entry = entries[i * lists.row + k * lists.column]
                     j, code = entry & INDEX_MASK, entry >> INDEX_BITS
-                    xj, vj, lifts = position[j], velocity[j], lift[j]
+                    xj, vj, partner_gradient = position[j], velocity[j], carried_gradient[j]
                     if code > 0:
                         xj, vj = image_position(box, xj, code), image_velocity(box, vj, code)
-                        lifts = image_gradient(box, lifts, code)
+                        partner_gradient = image_gradient(box, partner_gradient, code)
                     r, u = position[i] - xj, velocity[i] - vj
                     w, partner = mass[j] * slope(r.norm() / num.h, num.h), density[j]
                     if ti.static(changing):  # in volumes and compressions
                         relative = rest / rest_density(mass, volume, j)
-                        w, partner, lifts = w * relative, partner * relative, lifts * relative
+                        w, partner, partner_gradient = w * relative, partner * relative, partner_gradient * relative
                     approach += w * u.dot(r)
-                    spread += w * (rho - partner - (lift[i] + lifts).dot(r))
+                    spread += w * (rho - partner - (carried_gradient[i] + partner_gradient).dot(r))
                     second -= w * r.norm_sqr()
-                    lean += w * r
+                    first_moment += w * r
                     if ti.static(strength):
                         gradient -= w * u.outer_product(r)
                         moment -= w * r.outer_product(r)
@@ -148,7 +183,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 drift = second * num.lattice / 3.0 - rho
                 whole = 1.0
                 if drift <= 0.0:
-                    whole = ti.max(1.0 - lean.norm() * num.h / (WHOLE * rho), 0.0)
+                    whole = ti.max(1.0 - first_moment.norm() * num.h / (WHOLE * rho), 0.0)
                 grown = rest < 0.99 * phase.density
                 tolerance = num.density_tolerance
                 if grown:
@@ -179,15 +214,31 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     stress[i] = scale * (cauchy @ correction)
                 else:
-                    load[i] = scale * p
+                    pressure_term[i] = scale * p
 
     @ti.kernel
     def force(
-        num: SmoothingT, box: BoxT, lists: ListsT, entries: Ints, number: Ints, capacity: int, count: Ints, dt: Floats,
-        phases: Phases, phase_of: Ints, forces: Forces, position: Vectors, velocity: Vectors, mass: Floats,
-        volume: Floats, density: Floats, load: Floats, stress: Matrices, rate: Matrices,
+        num: SmoothingT,
+        box: BoxT,
+        lists: ListsT,
+        entries: Ints,
+        number: Ints,
+        capacity: int,
+        count: Ints,
+        dt: Floats,
+        phases: Phases,
+        phase_of: Ints,
+        forces: Forces,
+        position: Vectors,
+        velocity: Vectors,
+        mass: Floats,
+        volume: Floats,
+        density: Floats,
+        pressure_term: Floats,
+        stress: Matrices,
+        rate: Matrices,
         acceleration: Vectors,
-    ):  # fmt: skip
+    ):
         for i in range(position.shape[0]):
             world = i // capacity
             if i - world * capacity < count[world]:
@@ -237,7 +288,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                         if tension > 0.0:
                             along -= num.artificial_stress * tension * (kernel(q, num.h) / lattice) ** 4
                     else:
-                        both = load[i] + load[j]
+                        both = pressure_term[i] + pressure_term[j]
                         if ti.static(changing):
                             both /= rho * density[j]
                         along = shock * ti.min(ur, 0.0) / (r2 + tiny) - both

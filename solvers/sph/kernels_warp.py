@@ -10,8 +10,9 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE
-from fluidbench.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
+from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
+from fluidbench.native.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
 
 from .. import constitutive
 from ..aging import DISORDER, rest_density
@@ -67,18 +68,34 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
     name += "_changing" if changing else ""
 
     def strain(
-        num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-        phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), held: wp.array(dtype=int),
-        position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
-        volume: wp.array(dtype=float), density: wp.array(dtype=float), lift: wp.array(dtype=wp.vec3),
+        num: Smoothing,
+        box: Box,
+        lists: Lists,
+        capacity: int,
+        count: wp.array(dtype=int),
+        dt: wp.array(dtype=float),
+        phases: wp.array2d(dtype=Phase),
+        phase_of: wp.array(dtype=int),
+        held: wp.array(dtype=int),
+        position: wp.array(dtype=wp.vec3),
+        velocity: wp.array(dtype=wp.vec3),
+        mass: wp.array(dtype=float),
+        volume: wp.array(dtype=float),
+        density: wp.array(dtype=float),
+        carried_gradient: wp.array(dtype=wp.vec3),
         # outputs
-        elastic_normal: wp.array(dtype=wp.vec3), elastic_shear: wp.array(dtype=wp.vec3),
-        new_density: wp.array(dtype=float), load: wp.array(dtype=float), stress: wp.array(dtype=wp.mat33),
-        rate: wp.array(dtype=wp.mat33), fault: wp.array(dtype=int),
-    ):  # fmt: skip
+        elastic_normal: wp.array(dtype=wp.vec3),
+        elastic_shear: wp.array(dtype=wp.vec3),
+        new_density: wp.array(dtype=float),
+        pressure_term: wp.array(dtype=float),
+        stress: wp.array(dtype=wp.mat33),
+        rate: wp.array(dtype=wp.mat33),
+        fault: wp.array(dtype=int),
+    ):
         """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
-        Diffusion must not level the gradient that carries pressure, which is `lift` from both partners (see `move`).
+        Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
+        `move`).
         """
         i = wp.tid()
         world = i / capacity
@@ -91,14 +108,14 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
             if wp.static(changing):
                 rest = rest_density(mass, volume, i)
                 sound = phase.wave_speed * wp.sqrt(phase.density / rest)
-            own_lift = lift[i]
+            own_gradient = carried_gradient[i]
             inv_h = 1.0 / num.h
             inflow = float(0.0)
             spread = float(0.0)
             gradient = wp.mat33()
             moment = wp.mat33()
             second = float(0.0)
-            lean = wp.vec3(0.0, 0.0, 0.0)
+            first_moment = wp.vec3(0.0, 0.0, 0.0)
             start = i * lists.row
             for k in range(lists.number[i]):
                 entry = lists.entries[start + k * lists.column]
@@ -112,19 +129,19 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 r = x - xj
                 u = v - vj
                 w = mass[j] * slope(wp.sqrt(wp.dot(r, r)) * inv_h, num.h)
-                lifts = lift[j]
+                partner_gradient = carried_gradient[j]
                 if code > 0:
-                    lifts = image_gradient(box, lifts, code)
+                    partner_gradient = image_gradient(box, partner_gradient, code)
                 partner = density[j]
                 if wp.static(changing):
                     # in volumes and compressions: partners may be at rest at another density
                     share = rest / rest_density(mass, volume, j)
                     w *= share
                     partner *= share
-                    lifts *= share
-                spread += w * (rho - partner - wp.dot(own_lift + lifts, r))
+                    partner_gradient *= share
+                spread += w * (rho - partner - wp.dot(own_gradient + partner_gradient, r))
                 second -= w * wp.dot(r, r)
-                lean += w * r
+                first_moment += w * r
                 inflow += w * wp.dot(u, r)
                 if wp.static(strength):
                     gradient -= wp.outer(w * u, r)
@@ -138,7 +155,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
             # The density that particles really have, against the one they integrate, which drifts: applied where the
             # neighbourhood is complete (it leans to no side), or too crowded for any.
             drift = second * num.lattice / 3.0 - rho
-            whole = wp.max(1.0 - wp.length(lean) * num.h / (WHOLE * rho), 0.0)
+            whole = wp.max(1.0 - wp.length(first_moment) * num.h / (WHOLE * rho), 0.0)
             if drift > 0.0:
                 whole = 1.0
             tolerance = float(num.density_tolerance)
@@ -169,12 +186,28 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 s = elastic_shear[i]
                 if held[i] != CARRIED:
                     b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                        gradient[0, 0], gradient[0, 1], gradient[0, 2], gradient[1, 0], gradient[1, 1],
-                        gradient[1, 2], gradient[2, 0], gradient[2, 1], gradient[2, 2],
-                        b[0], b[1], b[2], s[0], s[1], s[2],
-                        phase.shear_modulus, phase.yield_stress, phase.plastic_viscosity, phase.flow_index,
-                        phase.relaxation_rate, h,
-                    )  # fmt: skip
+                        gradient[0, 0],
+                        gradient[0, 1],
+                        gradient[0, 2],
+                        gradient[1, 0],
+                        gradient[1, 1],
+                        gradient[1, 2],
+                        gradient[2, 0],
+                        gradient[2, 1],
+                        gradient[2, 2],
+                        b[0],
+                        b[1],
+                        b[2],
+                        s[0],
+                        s[1],
+                        s[2],
+                        phase.shear_modulus,
+                        phase.yield_stress,
+                        phase.plastic_viscosity,
+                        phase.flow_index,
+                        phase.relaxation_rate,
+                        h,
+                    )
                     b = wp.vec3(b_xx, b_yy, b_zz)
                     s = wp.vec3(b_xy, b_xz, b_yz)
                     elastic_normal[i] = b
@@ -183,18 +216,29 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 # With the correction of its gradient stress does on the particles exactly the work of the strain.
                 stress[i] = scale * (elastic_stress(g, b, s, p) * correction)
             else:
-                load[i] = scale * p
+                pressure_term[i] = scale * p
 
     def force(
-        num: Smoothing, box: Box, lists: Lists, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-        phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
-        position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), mass: wp.array(dtype=float),
-        volume: wp.array(dtype=float), density: wp.array(dtype=float), load: wp.array(dtype=float),
+        num: Smoothing,
+        box: Box,
+        lists: Lists,
+        capacity: int,
+        count: wp.array(dtype=int),
+        dt: wp.array(dtype=float),
+        phases: wp.array2d(dtype=Phase),
+        phase_of: wp.array(dtype=int),
+        force: wp.array(dtype=Force),
+        position: wp.array(dtype=wp.vec3),
+        velocity: wp.array(dtype=wp.vec3),
+        mass: wp.array(dtype=float),
+        volume: wp.array(dtype=float),
+        density: wp.array(dtype=float),
+        pressure_term: wp.array(dtype=float),
         stress: wp.array(dtype=wp.mat33),
         rate: wp.array(dtype=wp.mat33),
         # outputs
         acceleration: wp.array(dtype=wp.vec3),
-    ):  # fmt: skip
+    ):
         i = wp.tid()
         world = i / capacity
         if i - world * capacity < count[world]:
@@ -202,7 +246,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
             x = position[i]
             v = velocity[i]
             rho = density[i]
-            own = load[i]
+            own = pressure_term[i]
             own_stress, own_rate = wp.mat33(), wp.mat33()
             if wp.static(strength):
                 own_stress = stress[i]
@@ -235,13 +279,13 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 q = wp.sqrt(r2) * inv_h
                 f = mass[j] * slope(q, num.h)
                 ur = wp.dot(u, r)
-                rubs, flows = float(shock), float(drag)
+                wall_friction_acts, flows = float(shock), float(drag)
                 if wp.static(changing):
                     # both partners must find the same force: means of what differs between them
                     other_phase = phases[world, phase_of[j]]
                     other_rest = rest_density(mass, volume, j)
                     fast = shock + other_phase.wave_speed * wp.sqrt(other_phase.density / other_rest)
-                    rubs = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(rho, density[j])
+                    wall_friction_acts = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(rho, density[j])
                     thin = phase.viscosity * other_phase.viscosity
                     thin *= 2.0 / wp.max(phase.viscosity + other_phase.viscosity, 1.0e-30)
                     flows = 10.0 * num.viscous_lattice * thin / (rest * other_rest)
@@ -252,10 +296,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     flow = rate[j]
                     if code > 0:
                         flow = image_rate(box, flow, code)
-                    scalar = rubs * (ur - 0.5 * wp.dot(r, (own_rate + flow) * r)) / (r2 + tiny)
+                    scalar = wall_friction_acts * (ur - 0.5 * wp.dot(r, (own_rate + flow) * r)) / (r2 + tiny)
                 else:
                     # for approaching particles (Monaghan 1992)
-                    scalar = rubs * wp.min(ur, 0.0) / (r2 + tiny)
+                    scalar = wall_friction_acts * wp.min(ur, 0.0) / (r2 + tiny)
                 if wp.static(viscous):
                     # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j), at rest density: a cavitated liquid, whose
                     # density is low, would break the bound on dt
@@ -276,7 +320,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                         ratio = kernel(q, num.h) * inv_w
                         scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio
                 else:
-                    both = own + load[j]
+                    both = own + pressure_term[j]
                     if wp.static(changing):
                         both *= 1.0 / (rho * density[j])
                     scalar -= both
@@ -287,18 +331,18 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                             wall[axis] = wall[axis] + push[axis]
                             push[axis] = 0.0
                 a += push
-            # Friction walls push but never pull, and rub by Coulomb's law.
+            # Friction walls push but never pull, and wall_friction by Coulomb's law.
             for axis in range(3):
                 if wall[axis] != 0.0:
                     inward = wp.sign(0.5 * (box.lower[axis] + box.upper[axis]) - x[axis])
                     normal = wp.max(inward * wall[axis], 0.0)
-                    rub = box.lower_friction[axis]
+                    wall_friction = box.lower_friction[axis]
                     if inward < 0.0:
-                        rub = box.upper_friction[axis]
+                        wall_friction = box.upper_friction[axis]
                     slide = v + dt[world] * (a + pull)
                     slide[axis] = 0.0
                     speed = wp.length(slide)
-                    grip = wp.min(rub * normal, speed / dt[world])
+                    grip = wp.min(wall_friction * normal, speed / dt[world])
                     a -= (grip / wp.max(speed, 1.0e-12)) * slide
                     a[axis] = a[axis] + inward * normal
             acceleration[i] = a + pull
@@ -318,18 +362,30 @@ def _named(function, name: str) -> wp.Kernel:
 
 @wp.kernel
 def move(
-    box: Box, spacing: float, capacity: int, count: wp.array(dtype=int), dt: wp.array(dtype=float),
-    phases: wp.array2d(dtype=Phase), phase_of: wp.array(dtype=int), force: wp.array(dtype=Force),
-    held: wp.array(dtype=int), mass: wp.array(dtype=float), volume: wp.array(dtype=float),
-    acceleration: wp.array(dtype=wp.vec3), new_density: wp.array(dtype=float),
+    box: Box,
+    spacing: float,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    force: wp.array(dtype=Force),
+    held: wp.array(dtype=int),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
+    acceleration: wp.array(dtype=wp.vec3),
+    new_density: wp.array(dtype=float),
     # outputs
-    position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3), density: wp.array(dtype=float),
-    lift: wp.array(dtype=wp.vec3), fault: wp.array(dtype=int),
-):  # fmt: skip
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+    density: wp.array(dtype=float),
+    carried_gradient: wp.array(dtype=wp.vec3),
+    fault: wp.array(dtype=int),
+):
     """Symplectic Euler; a particle that would cross a wall stops at it.
 
-    `lift` is half the density gradient of the pressure that carries the particle, rho^2 (g - a) / K: that of
-    hydrostatic equilibrium for a liquid at rest (Fourtakas et al. 2019, Comput. Fluids 190:346), none in free fall.
+    `carried_gradient` is half the density gradient of the pressure that carries the particle, rho^2 (g - a) / K: that
+    of hydrostatic equilibrium for a liquid at rest (Fourtakas et al. 2019, Comput. Fluids 190:346), none in free fall.
     """
     i = wp.tid()
     world = i / capacity
@@ -337,13 +393,13 @@ def move(
         h = dt[world]
         v = velocity[i]
         carried = wp.vec3(0.0, 0.0, 0.0)
-        if held[i] == 0:
+        if held[i] == FREE:
             v += h * acceleration[i]
             phase = phases[world, phase_of[i]]
             rest = rest_density(mass, volume, i)
             stiffness = 0.5 * rest * rest / phase.bulk_modulus
             carried = stiffness * (force_at(force[world], position[i]) - acceleration[i])
-        lift[i] = carried
+        carried_gradient[i] = carried
         free = position[i] + h * v
         if too_fast(v, box.top_speed):
             wp.atomic_or(fault, 0, FAULT_ASTRAY)

@@ -8,21 +8,24 @@ import numpy as np
 import warp as wp
 from pydantic import Field
 
-from fluidbench.material import Material
-from fluidbench.particles import Pool
+from fluidbench.method.contract import Config, Economy
+from fluidbench.method.features import Feature
+from fluidbench.method.target import BACKENDS
+from fluidbench.method.timestep import Bound
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import Scene
+from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
-from fluidbench.scene import Scene
-from fluidbench.solver import Config, Feature, Solver
-from fluidbench.target import BACKENDS
-from fluidbench.timestep import Bound
+from fluidbench.scenario.material import Material
 
 from .. import aging
 from ..backends import backend_of
 from ..constitutive import STRETCHED
 from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
 from ..order import CellOrder
-from ..readout import shear_stress
+from ..readout import pressures, shear_stress
 from ..smoothing import wendland_slope
+from ..theory import sph_numbers, stable_dt
 from . import kernels_warp as kernels
 
 NonNegative = Annotated[float, Field(ge=0)]
@@ -63,15 +66,38 @@ class SolverSPH(Solver):
     """WCSPH with Wendland C2 kernel, delta-SPH density diffusion, mirror-image walls, symplectic Euler."""
 
     name = "sph"
+    rank = 2
     paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigSPH
     passes = ("lists", "strain", "force", "move")
-    OWN: ClassVar = ("new_density", "load", "stress", "rate", "acceleration")
+    OWN: ClassVar = ("new_density", "pressure_term", "stress", "rate", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
+    bare: ClassVar = {
+        "density_diffusion": 0.0,
+        "density_feedback": 0.0,
+        "artificial_viscosity": 0.0,
+        "artificial_viscosity_solid": 0.0,
+        "artificial_stress": 0.0,
+    }
+
+    @classmethod
+    def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
+        solid = scenario.material.youngs_modulus is not None
+        key = "smoothing_ratio_solid" if solid else "smoothing_ratio"
+        return [
+            Economy("fewer neighbours", {key: round(max(0.8 * config.smoothing(solid), 1.2), 3)}),
+            Economy("larger dt", {"cfl": 2.0 * config.cfl, "viscous_number": 0.11}),
+            Economy("no density feedback", {"density_feedback": 0.0}),
+        ]
+
+    @classmethod
+    def theory(cls, scenario: Scenario, config: Any) -> float:
+        ratio = config.smoothing(scenario.material.youngs_modulus is not None)
+        return stable_dt(cls, scenario, config, *sph_numbers(ratio, config.cfl, config.viscous_number))
 
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
@@ -96,12 +122,14 @@ class SolverSPH(Solver):
         g = scenario.peak_acceleration
         a = config
         return [
-            Bound("acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; validation H: < 1.73"),
+            Bound(
+                "acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; references.md, H: < 1.73"
+            ),
             Bound(
                 "viscous",
                 a.viscous_number * h * h / nu if nu > 0 else math.inf,
                 f"{a.viscous_number:g} h^2 / nu, artificial viscosity included",
-                "validation H: 0.111 h^2 / nu for the Monaghan-Gingold operator",
+                "references.md, H: 0.111 h^2 / nu for the Monaghan-Gingold operator",
             ),
             Bound(
                 "force",
@@ -126,7 +154,7 @@ class SolverSPH(Solver):
         self.num.density_feedback = config.density_feedback
         self.num.density_tolerance = config.density_tolerance
         pool.add_field("density", float, scene.scenario.material.density)
-        pool.add_field("lift", wp.vec3)
+        pool.add_field("carried_gradient", wp.vec3)
         self._rest_densities()
         solid = pool.size if scene.elastic else 1
         if scene.elastic:
@@ -135,7 +163,7 @@ class SolverSPH(Solver):
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
             self.new_density = wp.zeros(pool.size, dtype=float)
-            self.load = wp.zeros(pool.size, dtype=float)
+            self.pressure_term = wp.zeros(pool.size, dtype=float)
             self.stress = wp.zeros(solid, dtype=wp.mat33)
             self.rate = wp.zeros(solid, dtype=wp.mat33)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
@@ -169,9 +197,12 @@ class SolverSPH(Solver):
     def swell(self) -> None:
         pool = self.pool
         wp.launch(
-            aging.swell, pool.size, [pool.capacity, pool.count, self.scene.dt, pool.growth], [pool.volume],
+            aging.swell,
+            pool.size,
+            [pool.capacity, pool.count, self.scene.dt, pool.growth],
+            [pool.volume],
             device=self.scene.device,
-        )  # fmt: skip
+        )
 
     def harden(self, due: wp.array) -> None:
         pool, elastic = self.pool, self.scene.elastic
@@ -197,8 +228,17 @@ class SolverSPH(Solver):
         self.backend.launch(
             self.kernels.strain,
             pool.size,
-            [*self._common(), pool.held, pool.position, pool.velocity, pool.mass, pool.volume, pool.density, pool.lift],
-            [*elastic, self.new_density, self.load, self.stress, self.rate, pool.fault],
+            [
+                *self._common(),
+                pool.held,
+                pool.position,
+                pool.velocity,
+                pool.mass,
+                pool.volume,
+                pool.density,
+                pool.carried_gradient,
+            ],
+            [*elastic, self.new_density, self.pressure_term, self.stress, self.rate, pool.fault],
         )
 
     def force(self) -> None:
@@ -206,20 +246,43 @@ class SolverSPH(Solver):
         self.backend.launch(
             self.kernels.force,
             pool.size,
-            [*self._common(), self.scene.force, pool.position, pool.velocity, pool.mass, pool.volume, self.new_density,
-             self.load, self.stress, self.rate],
+            [
+                *self._common(),
+                self.scene.force,
+                pool.position,
+                pool.velocity,
+                pool.mass,
+                pool.volume,
+                self.new_density,
+                self.pressure_term,
+                self.stress,
+                self.rate,
+            ],
             [self.acceleration],
-        )  # fmt: skip
+        )
 
     def move(self) -> None:
         pool, scene = self.pool, self.scene
         self.backend.launch(
             self.kernels.move,
             pool.size,
-            [scene.box, scene.spacing, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase, scene.force,
-             pool.held, pool.mass, pool.volume, self.acceleration, self.new_density],
-            [pool.position, pool.velocity, pool.density, pool.lift, pool.fault],
-        )  # fmt: skip
+            [
+                scene.box,
+                scene.spacing,
+                pool.capacity,
+                pool.count,
+                scene.dt,
+                scene.phases,
+                pool.phase,
+                scene.force,
+                pool.held,
+                pool.mass,
+                pool.volume,
+                self.acceleration,
+                self.new_density,
+            ],
+            [pool.position, pool.velocity, pool.density, pool.carried_gradient, pool.fault],
+        )
 
     def prepare(self) -> None:
         if self.scene.changes:
@@ -235,6 +298,9 @@ class SolverSPH(Solver):
 
     def densities(self) -> np.ndarray:
         return self.pool.density.numpy()
+
+    def pressures(self) -> np.ndarray:
+        return pressures(self.scene, self.pool, self.densities())
 
     def shear_stresses(self) -> np.ndarray | None:
         return shear_stress(self.scene, self.pool)

@@ -1,0 +1,191 @@
+"""What commands take: each option declared once, read once, refused in one line."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import UserError, quoted
+
+if TYPE_CHECKING:
+    from ..scenario import Scenario
+    from ..study.workplace import Options
+
+MOST_REPEATS = 1000
+SHORTEST, LONGEST = 1e-3, 3.2e7  # wall time that a run may be given [s]
+ScenarioName = Annotated[str, typer.Argument(help="a shipped scenario (see `fluidbench list`) or a TOML file")]
+Settings = Annotated[list[str] | None, typer.Option("--set", help="override a key, e.g. material.yield_stress=50")]
+Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], instead of the scenario's")]
+Solvers = Annotated[
+    str | None, typer.Option(help="methods, separated by commas; default all that are installed", show_default=False)
+]
+Device = Annotated[str, typer.Option(help="cpu, or cuda:0, cuda:1, ...; cuda: all GPUs, shared out")]
+Backend = Annotated[str, typer.Option(help="language of the kernels: warp or taichi")]
+Threads = Annotated[int, typer.Option(min=1, help="CPU threads of taichi; with several, the last bits vary")]
+Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/ and the scenario or verb")]
+WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="run everything again, whatever is stored")]
+Jobs = Annotated[
+    int | None, typer.Option(min=1, help="runs at a time where timing does not matter; default 2, or 1 on CUDA")
+]
+Executor = Annotated[
+    str | None,
+    typer.Option(
+        help="where runs happen: here (default), or slurm, through submitit, as "
+        "in slurm or slurm:slurm_partition=gpu,timeout_min=60"
+    ),
+]
+Checkpoint = Annotated[
+    float,
+    typer.Option(
+        "--checkpoint-every",
+        help="wall seconds between checkpoints, from which the same command resumes a run that was killed; 0 for none",
+    ),
+]
+Pictures = Annotated[
+    float | None,
+    typer.Option(
+        "--render-every", help="simulated seconds between pictures, drawn beside the run into its folder film/"
+    ),
+]
+Frames = Annotated[bool, typer.Option("--frames", help="keep a snapshot of every output, not only of the last")]
+Shorter = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter and coarser version")]
+Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
+
+SHARED: dict[str, tuple[Any, Any]] = {
+    "device": (Device, "cpu"),
+    "backend": (Backend, "warp"),
+    "threads": (Threads, 1),
+    "out": (Out, None),
+    "wall_limit": (WallLimit, None),
+    "jobs": (Jobs, None),
+    "fresh": (Fresh, False),
+    "executor": (Executor, None),
+}
+"""Options of every command that runs something, with their defaults."""
+
+
+def running(wall_limit: float) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Gives a command the SHARED options; it gets them, checked, as `options` (study.workplace.Options)."""
+    shared = {**SHARED, "wall_limit": (WallLimit, wall_limit)}
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command, eval_str=True)
+        kept = [p for p in own.parameters.values() if p.name != "options"]
+        added = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+            for name, (kind, default) in shared.items()
+        ]
+
+        @functools.wraps(command)
+        def called(**given: Any) -> None:
+            options = {name: given.pop(name) for name in shared}
+            options["wall_limit"] = seconds(options["wall_limit"], "--wall-limit")
+            command(**given, options=options)
+
+        vars(called)["__signature__"] = own.replace(parameters=[*kept, *added])
+        called.__annotations__ = {p.name: p.annotation for p in [*kept, *added]}
+        return called
+
+    return decorate
+
+
+def placed(options: Options, default: str) -> Options:
+    """The options with the output folder's default filled in."""
+    return {**options, "out": Path(options.get("out") or Path("fluidbench-out") / default)}
+
+
+def load_scenario(name: str, settings: list[str] | None, spacing: float | None, quick: bool = False) -> Scenario:
+    from ..scenario.library import load
+
+    if spacing is not None and not (math.isfinite(spacing) and spacing > 0):
+        raise UserError(f"--spacing takes a positive number of metres; got {spacing:g}")
+    extra = [f"spacing={spacing!r}"] if spacing is not None else []
+    return load(name, [*(settings or []), *extra], quick)
+
+
+def names_in(text: str, option: str, what: str) -> list[str]:
+    """The names that an option lists, separated by commas; raises UserError for none, and for one twice."""
+    found = [part.strip() for part in text.split(",")]
+    if not any(found):
+        raise UserError(f"{option} {quoted(text)} names no {what}")
+    if not all(found):
+        raise UserError(f"{option} takes each {what} once, separated by commas; got {quoted(text)}")
+    for name in found:
+        if found.count(name) > 1:
+            raise UserError(f"{option} names {quoted(name)[1:-1]} twice")
+    return found
+
+
+def methods_in(solvers: str | None) -> list[str] | None:
+    """The methods that --solvers lists; None where it is not given."""
+    return None if solvers is None else names_in(solvers, "--solvers", "method")
+
+
+def positive(value: float, option: str, zero: bool = False) -> float:
+    """The value; raises UserError unless it is finite and positive (or `zero`)."""
+    if not math.isfinite(value) or value < 0 or (value == 0 and not zero) or 0 < value < 1e-9 or value > 1e9:
+        raise UserError(f"{option} takes a {'number of 0 or more' if zero else 'positive number'}; got {value:g}")
+    return value
+
+
+def seconds(value: float, option: str, zero: bool = False) -> float:
+    """The value; raises UserError unless it is a time that a run can take, up to a year [s]."""
+    if positive(value, option, zero) > LONGEST or 0 < value < SHORTEST:
+        raise UserError(f"{option} takes seconds, from {SHORTEST:g} up to a year; got {value:g}")
+    return value
+
+
+def repeats_of(value: int) -> int:
+    if value > MOST_REPEATS:
+        raise UserError(f"--repeats takes up to {MOST_REPEATS}; got {value}")
+    return value
+
+
+def fraction(text: str) -> float:
+    """'5%' or '0.05' -> 0.05; raises UserError for what is no positive share: a share above 1 needs its percent sign,
+    since 5 would be 500 %."""
+    percent = text.strip().endswith("%")
+    try:
+        value = float(text.strip().removesuffix("%")) / (100.0 if percent else 1.0)
+    except ValueError:
+        value = -1.0
+    if not (1e-6 <= value < 10.0):
+        raise UserError(f"--tolerance takes a share such as 5% or 0.05; got {quoted(text)}")
+    if value > 1.0 and not percent:
+        raise UserError(
+            f"--tolerance {text.strip()} would be {100 * value:g} %; write {text.strip()}% or a share below 1"
+        )
+    return value
+
+
+def count_of(text: str, option: str) -> int:
+    """'298000' -> 298000; raises UserError for what is no positive whole number."""
+    if not (text.isascii() and text.isdecimal()) or len(text) > 30 or int(text) == 0:
+        raise UserError(f"{option} takes whole numbers such as 298000, or fit; got {quoted(text)}")
+    return int(text)
+
+
+def budget_of(text: str | None) -> tuple[float, float]:
+    """'60s' -> (60, inf), 'realtime' -> (inf, 1), None -> (inf, inf): wall time [s] and wall s per simulated s."""
+    if text is None:
+        return math.inf, math.inf
+    word = text.strip().lower()
+    if word in ("", "none"):
+        return math.inf, math.inf
+    if word == "realtime":
+        return math.inf, 1.0
+    scale = {"s": 1.0, "m": 60.0, "h": 3600.0}.get(word[-1:])
+    try:
+        value = float(word[:-1] if scale else word) * (scale or 1.0)
+    except ValueError:
+        value = -1.0
+    if not SHORTEST <= value <= LONGEST:
+        raise UserError(f"--budget takes a time such as 60s, 5m or 1h, or realtime; got {quoted(text)}")
+    return value, math.inf

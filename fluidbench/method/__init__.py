@@ -1,0 +1,1 @@
+"""What a comparison needs of any method, and how methods are found."""

@@ -1,0 +1,1 @@
+"""How a method written on our particle pool runs."""

@@ -1,0 +1,301 @@
+"""A native session: emit, plan substeps, advance, look. Solver, time step and processes meet only here."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..errors import UserError
+from ..method.contract import Session, Steps
+from ..method.frame import Frame
+from ..method.suitability import Demands, check_backend, refusal
+from ..method.target import DEFAULT_BACKEND, HERE, Target
+from ..method.timestep import SPEED_MARGIN, Bound, Plan, plan
+from ..registry import get_method
+from ..scenario import Scenario
+from ..scenario.layout import capacity_of, emitted, generations
+from ..scenario.numerics import configure
+from . import health
+from .device import CountedLaunches
+from .health import Health, Vital
+from .pool import Pool
+from .process import contact, curing, emission, expansion
+from .process.contact import Contact
+from .process.curing import Curing
+from .process.emission import Emission
+from .process.expansion import Growing
+from .process.placement import Placement
+from .scene import Scene
+from .solver import Solver
+
+SORT_TICKS = 32  # ticks between reorderings of the pool, at most
+LOOK_TICKS = 8  # ticks between looks on a GPU, where looking waits for it
+
+
+class Simulation(Session):
+    """One native method on one scenario, or on several worlds of it."""
+
+    resumable = True
+
+    def __init__(
+        self,
+        scenarios: Scenario | Sequence[Scenario],
+        method: str | type[Solver],
+        target: Target = HERE,
+        config: Any = None,
+        graphs: bool = True,
+    ) -> None:
+        solver_class = get_method(method) if isinstance(method, str) else method
+        if not issubclass(solver_class, Solver):
+            raise TypeError(f"{solver_class.name} has sessions of its own")
+        check_backend(solver_class, target)
+        self.target = target
+        self.scene = Scene(scenarios, target.device)
+        self.scenario = self.scene.scenario
+        self.config = configure(solver_class, self.scenario) if config is None else config
+        for scenario in self.scene.scenarios:
+            if reason := refusal(solver_class, scenario, self.config):
+                raise UserError(f"{solver_class.name} cannot run {scenario.name}: {reason}")
+        self.pool = Pool(self.scene, capacity_of(self.scenario))
+        self.placement = Placement(self.scenario, self.pool)
+        self.emission = Emission(self.scene, self.pool) if self.scenario.nozzle is not None else None
+        material = self.scenario.material
+        growing = material.expansion is not None
+        family = (emitted(self.scenario), generations(self.scenario)) if growing else ()
+        self.growing = Growing(self.scene, self.pool, *family) if growing else None
+        self.solver = solver_class(self.scene, self.pool, self.config, target.backend, target.threads)
+        self.curing = Curing(self.scene, self.pool, self.solver.harden) if material.cure is not None else None
+        self.contact = Contact(self.scene, self.pool) if self.scenario.collider is not None else None
+        self.health = Health(self.scene, self.pool)
+        self._demands = [Demands(solver_class, s, self.config) for s in self.scene.scenarios]
+        self.tick, self.ticks, per_output = self.scenario.schedule
+        self.stride = self.tick * (1 if self.scene.device.is_cpu else min(LOOK_TICKS, per_output))
+        self.speed = self.scenario.reference_speed
+        self.done = 0
+        self.unseen = True  # whether somebody else may have changed the particles since the last audit
+        self.aged = 0  # ticks that this process has run
+        self._identity = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
+        self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
+        self._graphs: dict[int, Any] = {}
+        self.substep_launches, self.process_launches = CountedLaunches(), CountedLaunches()
+        self._use_graphs = graphs and target.backend == DEFAULT_BACKEND
+
+    @property
+    def now(self) -> float:
+        """Simulated time [s]."""
+        return self.done * self.tick
+
+    def bounds(self) -> list[Bound]:
+        """The bounds that hold now, over all worlds and materials that can be there, for the speed last seen."""
+        speed = SPEED_MARGIN * self.speed
+        return [
+            b
+            for d in self._demands
+            for s in d.until(self.now + self.tick)
+            for b in self.solver.bounds(s, self.config, speed)
+        ]
+
+    def prepare(self) -> None:
+        """Compile and load every kernel."""
+        self.solver.prepare()
+        wp.load_module(health, device=self.scene.device)
+        parts = {emission: self.emission, curing: self.curing, expansion: self.growing, contact: self.contact}
+        for module in (module for module, part in parts.items() if part is not None):
+            wp.load_module(module, device=self.scene.device)
+
+    def begin(self) -> Vital:
+        self._age()
+        self._refresh()
+        return self.look()
+
+    def advance(self, until: float) -> Steps:
+        """Whole ticks, to the first that ends at `until` [s] or later."""
+        taken = Steps()
+        for _ in range(max(1, math.ceil((until - self.now) / self.tick - 1e-6))):
+            plan = self.advance_tick()
+            active = sum(self.pool.counts)
+            taken.substeps += plan.substeps
+            taken.particle_substeps += plan.substeps * active
+            taken.peak_particles = max(taken.peak_particles, active)
+            taken.binding[plan.binding.name] = taken.binding.get(plan.binding.name, 0.0) + self.tick
+        return taken
+
+    def advance_tick(self) -> Plan:
+        """One tick: feed, plan, and run its substeps."""
+        if self.unseen or self.scene.device.is_cpu:  # on a GPU what nobody has looked at since the last audit is ours
+            self.health.audit()
+            self.unseen = False
+        with self.process_launches:
+            self._age()
+        if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
+            self.reorder(keys)
+        self._refresh()
+        steps = plan(self.bounds(), self.tick)
+        self.scene.set_dt(steps.dt)
+        self._run(steps.substeps)
+        self.done += 1
+        self.aged += 1
+        return steps
+
+    def _age(self) -> None:
+        """What happens to material whatever the method, at the start of a tick."""
+        self.placement.advance(self.now)
+        if self.emission is not None:
+            self.emission.advance(self.now, self.tick)
+        if self.growing is not None:
+            self.growing.advance(self.now, self.tick)
+        if self.curing is not None:
+            self.curing.advance(self.now)
+        if self.contact is not None:
+            self.contact.advance(self.now, self.tick)
+
+    def march(self, dt: float, substeps: int) -> None:
+        """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
+        self.health.audit()
+        self._refresh()
+        self.scene.set_dt(dt)
+        self._run(substeps)
+
+    def _refresh(self) -> None:
+        """Tell the solver, once, of particles that appeared or were moved."""
+        if self.pool.stale:
+            self.solver.refresh()
+            self.pool.stale = False
+
+    def look(self) -> Vital:
+        """Read the vital signs; synchronises with the device."""
+        vital, self.unseen = replace(self.health.read(), shortage=self.shortage()), True
+        self.speed = max(vital.speed, 0.1 * self.scenario.reference_speed)
+        return vital
+
+    def conclude(self) -> str | None:
+        """What is carried to the end is tested like what is carried on."""
+        self.health.audit()
+        return self.health.broken()
+
+    def frame(self, world: int = 0) -> Frame:
+        """A world's particles as they are now, see method/frame.py."""
+        spins, more = self.solver.spins(), {}
+        more["spin"] = np.zeros((self.pool.size, 3), np.float32) if spins is None else spins
+        for name, values in (("stress", self.solver.shear_stresses()), ("pressure", self.solver.pressures())):
+            if values is not None:
+                more[name] = values
+        found = self.pool.snapshot(world, density=self.solver.densities(), **more)
+        return {"time": np.array(self.now), **found}
+
+    def glimpse(self) -> Frame:
+        pool, n = self.pool, self.pool.counts[0]
+        return {name: pool.fields[name][:n].numpy() for name in ("position", "birth_time", "phase")}
+
+    def kick(self, velocity: np.ndarray) -> None:
+        self.pool.velocity.assign(velocity.astype(np.float32))
+
+    def allow_tension(self) -> None:
+        self.scene.allow_tension()
+
+    @property
+    def capacity(self) -> int:
+        return self.pool.size
+
+    def reorder(self, keys: wp.array) -> None:
+        """Sort the pool by a solver's keys."""
+        self._order.assign(self._identity)
+        wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
+        self.pool.permute(self._order)
+
+    def _substep(self) -> None:
+        """Everything of one substep, as it is captured."""
+        self.solver.substep()
+        if self.contact is not None:
+            self.contact.substep()
+
+    def _run(self, substeps: int) -> None:
+        """Replay `substeps` substeps: one graph a substep on the CPU, where replay is free, one for all on CUDA."""
+        if not self._use_graphs:
+            self._launch(substeps)
+            return
+        each = 1 if self.scene.device.is_cpu else substeps
+        if each not in self._graphs:
+            self.substep_launches = CountedLaunches()
+            with self.substep_launches, wp.ScopedCapture(device=self.scene.device) as capture:
+                for _ in range(each):
+                    self._substep()
+            self.substep_launches.count //= each
+            self._graphs[each] = capture.graph
+        for _ in range(substeps // each):
+            wp.capture_launch(self._graphs[each])
+
+    def _launch(self, substeps: int) -> None:
+        """Launch `substeps` substeps one by one, between those of Warp that came before and come after."""
+        self._wait()
+        self.substep_launches = CountedLaunches()
+        with self.substep_launches:
+            for _ in range(substeps):
+                self._substep()
+        self.substep_launches.count //= substeps
+        self._wait()
+
+    def _wait(self) -> None:
+        if self.solver.backend is not None:
+            self.solver.backend.wait()
+
+    def footprint(self) -> dict[str, int]:
+        """Bytes by part of everything allocated: the pool, the method, and each process that is on."""
+        owners = {
+            "pool": self.pool,
+            "solver": self.solver,
+            "curing": self.curing,
+            "expansion": self.growing,
+            "contact": self.contact,
+        }
+        return {
+            f"{owner}.{name}": size
+            for owner, part in owners.items()
+            if part is not None
+            for name, size in part.footprint().items()
+        }
+
+    def statistics(self) -> dict[str, Any]:
+        """Launches of kernels: of a substep, and of the processes a tick."""
+        process = self.process_launches.count / max(self.aged, 1)
+        return {"launches": {"per_substep": self.substep_launches.count, "process_per_tick": process}}
+
+    def peak_device_bytes(self) -> int | None:
+        device = self.scene.device
+        return None if device.is_cpu else wp.get_mempool_used_mem_high(device)
+
+    def shortage(self) -> str | None:
+        """What a kernel had no room for, in the solver's words."""
+        bits = int(self.pool.fault.numpy()[0])
+        words = [text for bit, text in self.solver.faults.items() if bits & bit]
+        return "; ".join(words) if words else None
+
+    def arrays(self) -> dict[str, wp.array]:
+        """Everything on the device that a run must have to go on as it was."""
+        found = {f"pool.{name}": array for name, array in self.pool.fields.items()}
+        found |= {"pool.count": self.pool.count, "pool.fault": self.pool.fault}
+        return found | {f"solver.{name}": array for name, array in self.solver.carried().items()}
+
+    def state(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        progress: dict[str, Any] = {
+            "done": self.done,
+            "speed": self.speed,
+            "counts": self.pool.counts,
+            "stale": bool(self.pool.stale),
+            "placement": self.placement.progress(),
+        }
+        progress |= {"emission": self.emission.progress()} if self.emission is not None else {}
+        return progress, {name: array.numpy() for name, array in self.arrays().items()}
+
+    def resume(self, progress: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
+        for name, array in self.arrays().items():
+            array.assign(arrays[name])
+        self.done, self.speed = progress["done"], progress["speed"]
+        self.pool.counts, self.pool.stale = list(progress["counts"]), progress["stale"]
+        self.placement.go_on(progress["placement"])
+        if self.emission is not None:
+            self.emission.go_on(progress["emission"])
+        self.solver.resume()

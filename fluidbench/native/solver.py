@@ -1,0 +1,91 @@
+"""The native contract: a method that is one substep of a pool of particles.
+
+A solver advances a pool of particles by one substep. It knows nothing of nozzles, schedules, files or measures.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ..method.contract import Method, Session
+from ..method.target import Target
+
+if TYPE_CHECKING:
+    from ..scenario import Scenario
+    from .pool import Pool
+    from .scene import Scene
+
+
+class Solver(Method):
+    """A method written on our pool of particles: subclass it, give it a Method's attributes and those below."""
+
+    passes: ClassVar[tuple[str, ...]]
+    faults: ClassVar[dict[int, str]] = {}
+    backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
+
+    @classmethod
+    def start(cls, scenario: Scenario, config: Any, target: Target) -> Session:
+        from .simulation import Simulation
+
+        return Simulation(scenario, cls, target, config)
+
+    @abstractmethod
+    def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
+        """Allocate everything the method needs: nothing is allocated later. `backend` is one of `backends`; `threads`
+        are those of the CPU, for a backend that can use several."""
+
+    @abstractmethod
+    def substep(self) -> None:
+        """Enqueue the passes that advance every particle by `scene.dt`.
+
+        No host synchronisation, no allocation and no branch on device data: with Warp the whole call is captured as a
+        graph.
+        """
+
+    def prepare(self) -> None:
+        """Compile the kernels; timed apart from the run."""
+
+    def refresh(self) -> None:
+        """Called between substeps, outside any graph, after particles appeared, moved in memory or were moved."""
+
+    def carried(self) -> dict[str, Any]:
+        """Arrays beyond the pool's that later substeps depend on, by name: what a checkpoint must hold."""
+        return {}
+
+    def resume(self) -> None:
+        """Called after the pool and what is `carried` were restored from a checkpoint, before the next substep."""
+
+    def harden(self, due: Any) -> None:
+        """Move every particle to its due row of the phase table (int, shape (worlds * capacity,)), between substeps.
+
+        Position, velocity and stress stay as they are: curing does no work. Required of methods that can CURE.
+        """
+        raise NotImplementedError(f"{self.name} cannot cure")
+
+    def sort_keys(self) -> Any | None:
+        """int64 keys that put neighbours side by side, in the first half of an array of twice the pool's size; None
+        to keep the order."""
+        return None
+
+    @abstractmethod
+    def densities(self) -> Any:
+        """Present density of every particle slot, shape (worlds * capacity,) [kg/m^3], as a NumPy array."""
+
+    def spins(self) -> Any | None:
+        """Angular momentum of every particle slot about its own centre, shape (worlds * capacity, 3) [kg m^2/s]; None
+        where particles have none."""
+        return None
+
+    def pressures(self) -> Any | None:
+        """Pressure of every particle slot, shape (worlds * capacity,) [Pa]; None where there is none."""
+        return None
+
+    def shear_stresses(self) -> Any | None:
+        """Elastic shear stress sqrt(J2) of every particle slot, shape (worlds * capacity,) [Pa]; None where there is
+        none, or where a method carries it otherwise than by particle."""
+        return None
+
+    @abstractmethod
+    def footprint(self) -> dict[str, int]:
+        """Bytes allocated by the method itself, by part."""

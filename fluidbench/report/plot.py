@@ -1,0 +1,52 @@
+"""What a plot shows, as plain data: drawn by figures.py into files and by page.py into pages."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..registry import method_names
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Okabe & Ito: distinct for colour-blind readers."""
+LIGHTER = ("#7FC1EC", "#F3A873", "#84D7BC", "#E5BBD3", "#F2CF80", "#AADAF4", "#808080")
+"""The same through another backend."""
+
+
+@functools.cache
+def _names() -> list[str]:
+    return method_names()
+
+
+def colour(label: str) -> str:
+    """A method's colour, by its place among the registered ones: the same in every plot; lighter for "mpm (taichi)" and
+    its like. What is no method has one by its name."""
+    method, _, backend = label.partition(" ")
+    names = _names()
+    place = names.index(method) if method in names else sum(map(ord, label))
+    return (LIGHTER if backend else COLOURS)[place % len(COLOURS)]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One line (or points, or bars) of a plot."""
+
+    label: str
+    x: list[Any]
+    y: list[float]
+    style: str = "line"
+    colour: str = "#000000"
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One plot: traces, axis titles with units; `equal`: both axes share a scale, `log`: both are logarithmic."""
+
+    name: str
+    title: str
+    x: str
+    y: str
+    traces: list[Trace] = field(default_factory=list)
+    equal: bool = False
+    log: bool = False

@@ -1,0 +1,71 @@
+"""Tables for people: the same rows in the terminal and on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from statistics import mean, stdev
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+class Link(str):
+    """A cell that leads somewhere on the page."""
+
+    def __new__(cls, text: str, href: str) -> Link:
+        made = super().__new__(cls, text)
+        made.href = href
+        return made
+
+    href: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of formatted cells under a head; the first column names the row."""
+
+    title: str
+    head: list[str]
+    rows: list[list[str]] = field(default_factory=list)
+    note: str = ""
+
+
+def show(console: Console, table: Table) -> None:
+    """Print a table to the terminal."""
+    from rich.markup import escape
+    from rich.table import Table as RichTable
+
+    wide = console.width >= 100  # on a narrow screen even names must fold
+    shown = RichTable(title=table.title, title_justify="left", title_style="bold")
+    for i, head in enumerate(table.head):
+        shown.add_column(escape(head), justify="left" if i == 0 else "right", overflow="fold", no_wrap=i == 0 and wide)
+    for row in table.rows:
+        shown.add_row(*map(escape, row))
+    console.print(shown)
+    if table.note:
+        console.print(table.note, markup=False, highlight=False)
+
+
+def number(value: float) -> str:
+    """Four significant digits."""
+    return f"{value:.4g}"
+
+
+def spread(values: Sequence[float]) -> str:
+    """A mean, with its standard deviation when there are several values."""
+    return number(mean(values)) if len(values) < 2 else f"{number(mean(values))} ± {stdev(values):.1g}"
+
+
+UNITS = {"m": "m", "m2": "m²", "kg": "kg", "J": "J", "s": "s", "MiB": "MiB"}
+
+
+def label(key: str) -> str:
+    """'bead_width_m' -> 'bead width [m]'."""
+    words = key.split("_")
+    if words[-2:] == ["per", "s"] or words[-3:] == ["per", "cpu", "s"] or words[-3:] == ["per", "simulated", "s"]:
+        return " ".join(words)
+    if words[-1] in UNITS and len(words) > 1:
+        return f"{' '.join(words[:-1])} [{UNITS[words[-1]]}]"
+    return " ".join(words)

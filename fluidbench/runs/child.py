@@ -1,0 +1,131 @@
+"""What a run's own process does: simulate, measure, and leave series, last snapshot and record in its folder."""
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..files import write_npz, write_parquet
+from ..method.contract import Session
+from ..method.suitability import approximations
+from ..method.verdict import FINAL, Verdict
+from ..method.vitals import Vital
+from ..registry import get_method
+from ..scenario import Scenario
+from ..scenario.numerics import configure
+from .checkpoint import Checkpoints
+from .drive import Drive, Outcome
+from .film import Film
+from .job import Job
+from .provenance import HARDWARE, machine
+from .record import FINAL_FRAME, SERIES, Cost, Record, frame_name, keep
+
+
+def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) -> Record:
+    """Run a job in this process; writes the series, the last snapshot and the record into the folder."""
+    import pandas as pd
+
+    from ..measure.ledger import final_lengths, ledger, lengths
+    from ..measure.reference import answers
+    from ..measure.tower import is_tower, success, verdict_of
+
+    scenario = Scenario.model_validate(job.scenario)
+    method = get_method(job.method)
+    heading, about = job.heading(), machine(job.target)
+    start = time.perf_counter()
+    session = method.start(scenario, configure(method, scenario), job.target)
+    rows: list[dict[str, float]] = []
+    film = None if job.film_every is None else Film(folder / "film", job.scenario, job.film_every)
+    identity = heading | {name: about[name] for name in HARDWARE} | job.watched()
+    every = job.checkpoint_every if session.resumable else 0.0
+    checkpoints = Checkpoints(folder, every, identity, session, rows, film)
+
+    def observe(session: Session, vital: Vital) -> None:
+        frame = session.frame()
+        measured = ledger(frame, scenario) | lengths(frame, scenario)
+        rows.append({"time_s": session.now, "top_speed_m_s": vital.speed, **measured})
+        if job.keep_frames:
+            write_npz(folder / frame_name(len(rows) - 1), frame)
+        report({"time": session.now, "until": scenario.duration, "speed": vital.speed})
+
+    outcome = Drive(session, scenario, observe, job.wall_limit, checkpoints, film).run()
+    undrawn = [] if film is None else [text for text in [film.close()] if text]
+    frame, series = session.frame(), pd.DataFrame(rows)
+    write_parquet(folder / SERIES, series)
+    write_npz(folder / FINAL_FRAME, frame)
+    frames = [frame_name(i) for i in range(len(rows))] if job.keep_frames else []
+    complete = outcome.verdict is Verdict.COMPLETED
+    final = {**ledger(frame, scenario), **final_lengths(frame, scenario)} if complete else {}
+    compared, not_compared = answers(scenario, series, final) if complete else ([], [])
+    criteria = success(scenario, final, series) if complete and is_tower(scenario) else []
+    record = Record(
+        **heading,
+        verdict=outcome.verdict,
+        reason=outcome.reason,
+        measures=final,
+        answers=tuple(compared),
+        not_compared=tuple(not_compared),
+        success=tuple(criteria),
+        print=verdict_of(criteria) if criteria else None,
+        cost=cost(outcome, session, time.perf_counter() - start),
+        **session.statistics(),
+        bytes=session.footprint(),
+        bounds_s={b.name: b.dt for b in session.bounds()},
+        binding_s=outcome.binding,
+        approximations=tuple(approximations(method, scenario, session.config)),
+        warnings=tuple(scenario.warnings() + undrawn + _numberless(final)),
+        config=session.config.model_dump(),
+        input=scenario.model_dump(mode="json"),
+        machine=about,
+        film_every=job.film_every,
+        resumed=checkpoints.resumed,
+    )
+    record = keep(folder, record, [SERIES, FINAL_FRAME, *frames])
+    if outcome.verdict in FINAL:
+        checkpoints.discard()
+    session.close()
+    return record
+
+
+def _numberless(measures: dict[str, float]) -> list[str]:
+    return [f"{name} is no number" for name, value in measures.items() if not math.isfinite(value)]
+
+
+def cost(outcome: Outcome, session: Session, total: float) -> Cost:
+    """What a run cost, compilation apart; rates are of the loop alone, measurements and output not included."""
+    wall, cpu = max(outcome.wall, 1e-9), max(outcome.cpu, 1e-9)
+    bytes_used = sum(session.footprint().values())
+    device = session.peak_device_bytes()
+    return Cost(
+        simulated_s=outcome.time,
+        wall_s=outcome.wall,
+        cpu_s=outcome.cpu,
+        prepare_s=outcome.prepare_wall,
+        total_s=total,
+        substeps=outcome.substeps,
+        mean_dt_s=outcome.time / max(outcome.substeps, 1),
+        steps_per_s=outcome.substeps / wall,
+        particle_substeps_per_s=outcome.particle_substeps / wall,
+        particle_substeps_per_cpu_s=outcome.particle_substeps / cpu,
+        wall_per_simulated_s=wall / max(outcome.time, 1e-12),
+        simulated_to_real=outcome.time / wall,
+        peak_particles=outcome.peak_particles,
+        bytes_per_particle=bytes_used / max(session.capacity, 1),
+        peak_memory_MiB=peak_memory() / 2**20,
+        peak_device_MiB=None if device is None else device / 2**20,
+    )
+
+
+def peak_memory() -> float:
+    """Most memory that this process has held at once [bytes]."""
+    import psutil
+
+    info = psutil.Process().memory_info()
+    if hasattr(info, "peak_wset"):  # Windows
+        return float(info.peak_wset)
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)

@@ -1,0 +1,149 @@
+"""The one loop over a session: advance, look, observe, keep. Whatever the method, it is here that time is taken."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+from ..method.contract import OutOfCapacity, Session, Steps
+from ..method.verdict import Verdict
+from ..method.vitals import Vital
+from ..scenario import Scenario
+
+if TYPE_CHECKING:
+    from .checkpoint import Checkpoints
+
+PACE_SECONDS = 8.0  # wall time after which the pace is judged against the wall limit
+Observer = Callable[[Session, Vital], None]
+
+
+class Camera(Protocol):
+    """Takes pictures on the way."""
+
+    next: float
+
+    def shoot(self, session: Session) -> None: ...
+
+
+@dataclass
+class Outcome:
+    """How far a run came, what it cost and which bound held it back."""
+
+    verdict: Verdict = Verdict.COMPLETED
+    reason: str = ""
+    time: float = 0.0
+    substeps: int = 0
+    particle_substeps: int = 0
+    wall: float = 0.0
+    cpu: float = 0.0
+    prepare_wall: float = 0.0
+    binding: dict[str, float] = field(default_factory=dict)
+    peak_particles: int = 0
+
+    def add(self, steps: Steps) -> None:
+        self.substeps += steps.substeps
+        self.particle_substeps += steps.particle_substeps
+        self.peak_particles = max(self.peak_particles, steps.peak_particles)
+        for name, held in steps.binding.items():
+            self.binding[name] = self.binding.get(name, 0.0) + held
+
+    def end(self, verdict: Verdict, reason: str) -> None:
+        self.verdict, self.reason = verdict, reason
+
+
+@dataclass
+class Drive:
+    """A session on its way through a scenario: run to the end, or until something breaks.
+
+    `observe` is called at every output, checkpoints are written off the clock, pictures are taken on it. With
+    checkpoints the run goes on from one where there is one.
+    """
+
+    session: Session
+    scenario: Scenario
+    observe: Observer | None = None
+    wall_limit: float | None = None
+    checkpoints: Checkpoints | None = None
+    camera: Camera | None = None
+    outcome: Outcome = field(default_factory=Outcome)
+
+    def __post_init__(self) -> None:
+        tick, ticks, per_output = self.scenario.schedule
+        self.end, self.interval = tick * ticks, tick * per_output
+        self.near = 1e-6 * tick  # two times nearer than this are the same
+
+    def run(self) -> Outcome:
+        outcome, session = self.outcome, self.session
+        start = time.perf_counter()
+        session.prepare()
+        outcome.prepare_wall = time.perf_counter() - start
+        if self.checkpoints is None or not self.checkpoints.restore(outcome):
+            self.begin()
+        while session.now < self.end - self.near and outcome.verdict is Verdict.COMPLETED:
+            self.leg()
+            if self.checkpoints is not None and self.checkpoints.due() and outcome.verdict is Verdict.COMPLETED:
+                self.checkpoints.write(outcome)
+        outcome.time = session.now
+        if outcome.verdict is Verdict.COMPLETED and (broken := session.conclude()):
+            outcome.end(Verdict.DIVERGED, f"at t = {session.now:.4g} s {broken}")
+        return outcome
+
+    def begin(self) -> None:
+        try:
+            vital = self.session.begin()
+        except OutOfCapacity as error:
+            self.outcome.end(Verdict.OUT_OF_CAPACITY, str(error))
+            return
+        if self.observe is not None:
+            self.observe(self.session, vital)
+
+    def leg(self) -> None:
+        """On to the next time at which there is something to do, and a look at what came of it."""
+        session, outcome = self.session, self.outcome
+        output = min(self.interval * (int((session.now + self.near) / self.interval) + 1), self.end)
+        until = min(output, session.now + session.stride)
+        if self.camera is not None and self.camera.next > session.now + self.near:
+            until = min(until, self.camera.next)
+        wall, cpu = time.perf_counter(), time.process_time()
+        try:
+            steps = session.advance(until)
+        except OutOfCapacity as error:
+            outcome.end(Verdict.OUT_OF_CAPACITY, str(error))
+            return
+        vital = session.look()
+        if self.camera is not None and session.now >= self.camera.next - self.near:
+            self.camera.shoot(session)
+        outcome.wall += time.perf_counter() - wall
+        outcome.cpu += time.process_time() - cpu
+        outcome.add(steps)
+        self.judge(vital, session.now >= output - self.near)
+
+    def judge(self, vital: Vital, at_output: bool) -> None:
+        """End the run for what its vital signs, or its clock, say; otherwise observe what is to be observed."""
+        session, outcome = self.session, self.outcome
+        if vital.complaint:
+            outcome.end(Verdict.DIVERGED, f"at t = {session.now:.4g} s {vital.complaint}")
+        elif vital.shortage:
+            outcome.end(Verdict.OUT_OF_CAPACITY, f"at t = {session.now:.4g} s {vital.shortage}")
+        else:
+            if self.observe is not None and at_output:
+                self.observe(session, vital)
+            if late := self.too_slow():
+                if self.checkpoints is not None and self.checkpoints.every > 0:
+                    self.checkpoints.write(outcome)  # with a larger limit it goes on from here
+                outcome.end(Verdict.TIMEOUT, late)
+
+    def too_slow(self) -> str | None:
+        """Over the wall limit, or certain to be: the pace only falls as particles are added."""
+        wall, limit, now = self.outcome.wall, self.wall_limit, self.session.now
+        if limit is None:
+            return None
+        expected = wall * self.end / now
+        if wall > limit or (wall > min(PACE_SECONDS, limit) and expected > 2.0 * limit):
+            return (
+                f"stopped at t = {now:.4g} s after {wall:.0f} s: at this pace the run takes at least {expected:.0f} s, "
+                f"the limit is {limit:.0f} s"
+            )
+        return None

@@ -1,0 +1,235 @@
+"""Finding, reading and overriding scenarios: TOML files with `extends`, `key=value` overrides, errors with a place."""
+
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import UserError, quoted, suggestion
+from .numerics import check_numerics
+from .scenario import Scenario
+
+DEEPEST = 32  # files that extend one another
+LARGEST = 2**20  # bytes of a scenario file
+MOST_LINES = 5  # mistakes that are told at once
+
+
+def shipped() -> dict[str, Path]:
+    """Name -> file of every scenario in the package."""
+    return {path.stem: path for path in _data("extrusion", ".toml")}
+
+
+def reference_tables() -> list[Path]:
+    """The tables that runs are compared with; the answers that `validate` found are none of them."""
+    return [path for path in _data("reference", ".csv") if path.stem != "known_answers"]
+
+
+def reference_table(name: str) -> Path:
+    """The file of a reference table."""
+    return next(path for path in _data("reference", ".csv") if path.stem == name)
+
+
+def _data(folder: str, suffix: str) -> list[Path]:
+    """Files of the package `scenarios`, by name."""
+    found = (Path(str(entry)) for entry in files("scenarios").joinpath(folder).iterdir())
+    return sorted(path for path in found if path.suffix == suffix)
+
+
+def find(reference: str | Path) -> Path:
+    """The file meant by a path or by the name of a shipped scenario."""
+    known, path = shipped(), Path(reference)
+    try:
+        there, is_file = path.exists(), path.is_file()
+    except (OSError, ValueError) as error:  # a name that is too long, or has a null character
+        raise UserError(f"{quoted(str(reference))} is no file name: {_why(error)}") from None
+    if str(reference) in known and not (there and path.suffix == ".toml"):
+        return known[str(reference)]
+    if path.suffix == ".toml" or there:
+        if not is_file:
+            raise UserError(f"no such scenario file: {quoted(str(path))}")
+        return path
+    raise UserError(f"no scenario named {quoted(str(reference))}{suggestion(str(reference), known)}")
+
+
+def _why(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error)
+
+
+def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = None, quick: bool = False) -> Scenario:
+    """Read a scenario and apply overrides such as {"material.yield_stress": 50} or ["material.yield_stress=50"].
+
+    `reference` is the name of a shipped scenario, or a TOML file; the values of `overrides` are in SI units, and None
+    takes a key out. `quick` merges the file's own [quick] table first; a file without one gets a third more spacing.
+
+    Raises UserError naming the file and key of whatever is wrong.
+    """
+    path = find(reference)
+    table = _read(path, ())
+    table.setdefault("name", path.stem)
+    shorter = table.pop("quick", None)
+    if not isinstance(shorter, dict | None):
+        raise UserError(f"{path}: quick: a table is wanted (got {quoted(shorter)})")
+    if quick:
+        table = _merge(table, shorter) if shorter is not None else _coarser(table)
+    if isinstance(overrides, list):
+        overrides = dict(parse_override(text) for text in overrides)
+    for key, value in (overrides or {}).items():
+        assign(table, key, value)
+    return validate(table, f"{path} with --set" if overrides else str(path))
+
+
+def _coarser(table: dict[str, Any]) -> dict[str, Any]:
+    """A third more spacing, where there is one that is a number."""
+    spacing = table.get("spacing")
+    return table | {"spacing": 4 / 3 * spacing} if isinstance(spacing, int | float) else table
+
+
+def define(name: str, **table: Any) -> Scenario:
+    """A scenario from keyword tables, validated like a file.
+
+    `name` is what folders are called by; `table` holds the keys of a TOML file, in SI units.
+
+    Raises UserError with the key of whatever is wrong.
+    """
+    return validate({"name": name, **table}, name)
+
+
+def validate(table: dict[str, Any], where: str) -> Scenario:
+    """A table as a Scenario; raises UserError with one line a mistake, each with the key and the cure."""
+    try:
+        scenario = Scenario.model_validate(table)
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_context=False)
+        lines = list(dict.fromkeys(_explain(item, where) for item in found[:MOST_LINES]))
+        more = [f"{where}: and {len(found) - MOST_LINES} more mistakes"] if len(found) > MOST_LINES else []
+        raise UserError("\n".join([*lines, *more])) from None
+    except (ArithmeticError, MemoryError, RecursionError) as error:
+        raise UserError(f"{where}: cannot be computed with ({type(error).__name__}: {error})") from None
+    try:
+        check_numerics(scenario)
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
+    return scenario
+
+
+def parse_override(text: str) -> tuple[str, Any]:
+    """'key=value' -> (key, value), the value read as TOML and otherwise as a string; `none` takes the key out."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise UserError(f"--set takes key=value, such as material.yield_stress=50; got {quoted(text)}")
+    if value.strip() == "none":
+        return key.strip(), None
+    try:
+        found = tomllib.loads(f"value = {value}")
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
+    except (RecursionError, ValueError) as error:
+        raise UserError(f"--set {quoted(key.strip())[1:-1]}: {quoted(value)} cannot be read: {error}") from None
+    if set(found) != {"value"}:
+        raise UserError(f"--set takes one key=value; got {quoted(text)}")
+    return key.strip(), found["value"]
+
+
+def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
+    """A file's table with the tables that it extends underneath."""
+    path = path.resolve()
+    if path in seen:
+        raise UserError(f"{path}: extends itself by way of {seen[-1].name}")
+    if len(seen) >= DEEPEST:
+        raise UserError(f"{seen[0]}: extends more than {DEEPEST} files deep")
+    try:
+        if path.stat().st_size > LARGEST:
+            raise UserError(f"{path}: {path.stat().st_size} bytes are no scenario; {LARGEST} at most")
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:  # TOML's and Unicode's errors are values'
+        raise UserError(f"{path}: not valid TOML: {_short(error)}") from None
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
+    base = table.pop("extends", None)
+    if base is None:
+        return table
+    if not isinstance(base, str):
+        raise UserError(f"{path}: extends: the name of a scenario or a file is wanted (got {quoted(base)})")
+    try:
+        beside = path.parent / base
+        further = beside if beside.is_file() else find(base)
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: extends: {quoted(base)} is no file name: {_why(error)}") from None
+    except UserError as error:
+        raise UserError(f"{path}: extends: {error}") from None
+    return _merge(_read(further, (*seen, path)), table)
+
+
+def _short(error: Exception) -> str:
+    """What an error says, on one line of bearable length."""
+    text = " ".join(str(error).split())
+    return text if len(text) <= 450 else f"{text[:450]}..."
+
+
+def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
+    """`change` over `base`: tables merge key by key, anything else is replaced."""
+    merged = dict(base)
+    for key, value in change.items():
+        both = isinstance(value, dict) and isinstance(base.get(key), dict)
+        merged[key] = _merge(base[key], value) if both else value
+    return merged
+
+
+def assign(table: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key, stepping into tables by name and into lists by number; None takes it out."""
+    *parents, last = key.split(".")
+    if len(parents) > DEEPEST or not all((*parents, last)):
+        raise UserError(f"--set {quoted(key)}: keys are names joined by dots, such as material.yield_stress")
+    node: Any = table
+    for part in parents:
+        node = node[_position(node, part, key)] if isinstance(node, list | tuple) else node.setdefault(part, {})
+        if not isinstance(node, dict | list):
+            raise UserError(f"--set {key}: {quoted(part)} is a value, not a table")
+    if isinstance(node, list):
+        node[_position(node, last, key)] = value
+    elif value is None:
+        node.pop(last, None)
+    else:
+        node[last] = value
+
+
+def _position(node: list[Any] | tuple[Any, ...], part: str, key: str) -> int:
+    if not (part.isascii() and part.isdigit()) or len(part) > 9 or int(part) >= len(node):
+        raise UserError(f"--set {key}: {quoted(part)} must be a number below {len(node)}")
+    return int(part)
+
+
+def _explain(item: Any, where: str) -> str:
+    """One pydantic error in words."""
+    path = [str(part) for part in item["loc"] if not str(part).startswith(("literal[", "function-", "tagged"))]
+    path = path or [str(part) for part in item["loc"]]
+    key = quoted(".".join(path))[1:-1] or "scenario"
+    if item["type"] == "extra_forbidden":
+        return f"{where}: unknown key '{key}'{suggestion(path[-1], _fields_at(path[:-1]))}"
+    if item["type"] == "missing":
+        return f"{where}: '{key}' is missing"
+    message = _short(item["msg"]).removeprefix("Value error, ")
+    got = "" if item["type"] == "value_error" else f" (got {quoted(item['input'])})"
+    return f"{where}: {key}: {message[0].lower()}{message[1:]}{got}"
+
+
+def _fields_at(path: list[str]) -> list[str]:
+    """The keys that the model at `path` knows."""
+    model: Any = Scenario
+    for part in path:
+        field = None if part.isdigit() else model.model_fields.get(part)
+        if field is not None:
+            model = _model_in(field.annotation) or model
+    return list(model.model_fields)
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The first model inside an annotation such as `tuple[Body, ...] | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for inner in getattr(annotation, "__args__", ()):
+        if (found := _model_in(inner)) is not None:
+            return found
+    return None

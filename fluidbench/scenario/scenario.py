@@ -1,0 +1,288 @@
+"""What to simulate: the validated description of one scenario, in SI units with z up.
+
+A scenario says nothing of any method except in `numerics`, where each method's own section may override its defaults.
+It is read from TOML (`load`), or built in Python from the same classes.
+"""
+
+import math
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from ..errors import quoted
+from .body import CORNERS, Body
+from .collider import Collider
+from .domain import Domain
+from .extent import check_size, check_time
+from .material import Material
+from .model import Matrix, Model, Positive, Vector
+from .nozzle import Nozzle
+from .toolpath import Toolpath, Track
+
+LONGEST_NAME = 80
+VOLUMES = 2.0  # largest factor between a particle's own volume and spacing^3
+AGES = 65  # ages at which bounds look at a material that changes
+
+
+class Scenario(Model):
+    """One experiment, the same for every method; SI units, z up, see docs/scenario.md for every key.
+
+    Raises ValueError for what makes no experiment; `load` and `define` say it as a UserError, with key and cure.
+    """
+
+    judged_later: ClassVar = ("pool",)
+    name: str = Field("unnamed", description="short name, used for folders")
+    title: str = Field("", description="one line for people")
+    domain: Domain
+    material: Material
+    gravity: Vector = Field((0.0, 0.0, -9.81), description="gravitational acceleration [m/s^2]")
+    body_force: Vector = Field((0.0, 0.0, 0.0), description="further force per unit mass [m/s^2]")
+    body_force_gradient: Matrix | None = Field(None, description="its change over space, symmetric [1/s^2]")
+    body_force_center: Vector = Field((0.0, 0.0, 0.0), description="where the gradient adds nothing [m]")
+    nozzle: Nozzle | None = None
+    toolpath: Toolpath | None = None
+    collider: Collider | None = Field(None, description="a rigid body carried along the toolpath")
+    bodies: tuple[Body, ...] = ()
+    duration: Positive = Field(description="simulated time [s]")
+    output_interval: Positive | None = Field(None, description="time between outputs [s]; default duration / 20")
+    tick: Positive | None = Field(None, description="time between emission events and re-planned substeps [s]")
+    spacing: Positive = Field(description="particle spacing d [m]; a particle stands for d^3")
+    sound_speed_ratio: Positive = Field(10.0, description="artificial c of a liquid over its reference speed [-]")
+    jitter: Annotated[float, Field(ge=0, le=0.5)] = Field(0.0, description="random shift of bodies' particles / d [-]")
+    pool: Annotated[int, Field(ge=1)] | None = Field(None, description="particles to preallocate; default an estimate")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="the only source of randomness")
+    reference: Literal["martin_moyce_front", "viscoplastic_slump"] | None = Field(
+        None, description="a published answer to compare with (scenarios/reference)"
+    )
+    numerics: dict[str, dict[str, Any]] = Field({}, description="per method: overrides of its own numerical settings")
+
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, name: str) -> str:
+        plain = name.isprintable() and not set(name) & set('/\\:*?"<>|') and name == name.strip(" .")
+        if not (plain and 0 < len(name) <= LONGEST_NAME):
+            raise ValueError(
+                f'names a folder: 1 to {LONGEST_NAME} printable characters without / \\ : * ? " < > | and without a '
+                f"blank or a dot at either end (got {quoted(name)})"
+            )
+        return name
+
+    @field_validator("title")
+    @classmethod
+    def _is_a_line(cls, title: str) -> str:
+        if not title.isprintable() or len(title) > 300:
+            raise ValueError(f"is one line of at most 300 printable characters (got {quoted(title)})")
+        return title
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Scenario":
+        for check in (
+            self._check_source,
+            self._check_extent,
+            self._check_nozzle,
+            self._check_bodies,
+            self._check_periodic,
+            self._check_force,
+            self._check_collider,
+        ):
+            check()
+        return self
+
+    def _check_source(self) -> None:
+        if (self.nozzle is None) != (self.toolpath is None):
+            raise ValueError("nozzle and toolpath belong together: give both or neither")
+        if self.nozzle is None and not self.bodies:
+            raise ValueError("nothing to simulate: give bodies, or a nozzle with a toolpath")
+
+    def _check_extent(self) -> None:
+        check_size(self)
+        check_time(self)
+
+    def _check_nozzle(self) -> None:
+        if self.nozzle is None or self.track is None:
+            return
+        if self.spacing > self.nozzle.diameter / 2:
+            raise ValueError(
+                f"spacing = {self.spacing} is too coarse for nozzle.diameter = {self.nozzle.diameter}: "
+                "at least 2 particles must fit across it, 8 resolve a bead"
+            )
+        r = self.nozzle.diameter / 2
+        margin = np.array([r, r, 0.0])
+        low, high = self.track.position.min(axis=0) - margin, self.track.position.max(axis=0) + margin
+        for axis, a, b in zip("xyz", low, high, strict=True):
+            i = "xyz".index(axis)
+            if a < self.domain.lower[i] or b > self.domain.upper[i]:
+                what = "nozzle (standoff and layers)" if axis == "z" else "toolpath (with the nozzle's radius)"
+                raise ValueError(
+                    f"the {what} spans {axis} = {a:.6g} .. {b:.6g} m and leaves the domain, which spans "
+                    f"{self.domain.lower[i]:.6g} .. {self.domain.upper[i]:.6g} m"
+                )
+
+    def _check_bodies(self) -> None:
+        for i, body in enumerate(self.bodies):
+            low, high = np.asarray(body.center) - body.extent, np.asarray(body.center) + body.extent
+            if (high <= self.domain.lower).any() or (low >= self.domain.upper).any():
+                raise ValueError(f"bodies.{i} lies outside the domain")
+            if body.positions is None and (2 * body.extent < self.spacing).any():
+                raise ValueError(f"bodies.{i} is thinner than one particle spacing ({self.spacing} m)")
+            self._check_volumes(i, body)
+            if body.start > 0 and body.start > self.duration - self.schedule[0]:
+                raise ValueError(f"bodies.{i}: start = {body.start} s is not before the last tick of {self.duration} s")
+
+    def _check_volumes(self, i: int, body: Body) -> None:
+        if body.volumes is None:
+            return
+        low, high = (float(v) / self.spacing**3 for v in (body.volumes.array.min(), body.volumes.array.max()))
+        if low < 1 / VOLUMES or high > VOLUMES:
+            raise ValueError(
+                f"bodies.{i}: volumes span {low:.3g} .. {high:.3g} spacing^3; a particle stands for one, within a "
+                f"factor of {VOLUMES:g}"
+            )
+
+    def _check_periodic(self) -> None:
+        for axis, periodic in enumerate(self.domain.walls.periodic()):
+            length = self.domain.upper[axis] - self.domain.lower[axis]
+            if periodic and length < 6 * self.spacing:
+                raise ValueError(
+                    f"a periodic axis needs at least 6 spacings; {'xyz'[axis]} has {length / self.spacing:.3g}"
+                )
+
+    def _check_force(self) -> None:
+        if self.body_force_gradient is not None and not np.allclose(self.gradient, self.gradient.T):
+            raise ValueError("body_force_gradient must be symmetric: only then has the force a potential")
+
+    def _check_collider(self) -> None:
+        if self.collider is None:
+            return
+        if self.track is None or self.nozzle is None:
+            raise ValueError("collider: it is carried along the toolpath; give nozzle and toolpath")
+        start, r = self.track.at(0.0), self.nozzle.diameter / 2
+        for i, body in enumerate(self.bodies):
+            low, high = np.asarray(body.center) - body.extent, np.asarray(body.center) + body.extent
+            grid = [np.linspace(a, b, 9) for a, b in zip(low, high, strict=True)]
+            points = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 3)
+            if (self.collider.distance(points - start) < 0).any():
+                raise ValueError(f"collider: it starts inside bodies.{i}; raise collider.clearance or move the body")
+        jet = np.array(
+            [[x, y, z] for x in (-r, 0, r) for y in (-r, 0, r) for z in np.linspace(-self.nozzle.standoff, 0, 9)]
+        )
+        if (self.collider.distance(jet) < 0).any():
+            raise ValueError("collider: it starts inside the material that leaves the nozzle; raise collider.clearance")
+
+    @cached_property
+    def track(self) -> Track | None:
+        """The toolpath in time."""
+        if self.nozzle is None or self.toolpath is None:
+            return None
+        return Track.of(self.toolpath, self.domain.lower[2], self.nozzle.standoff)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Gravity plus body force where its gradient adds nothing, shape (3,) [m/s^2]."""
+        return np.asarray(self.gravity) + np.asarray(self.body_force)
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """Gradient of the body force, shape (3, 3) [1/s^2]."""
+        return np.zeros((3, 3)) if self.body_force_gradient is None else np.asarray(self.body_force_gradient)
+
+    def potential_at(self, points: np.ndarray) -> np.ndarray:
+        """Minus the potential energy per unit mass at points of shape (n, 3) [J/kg]."""
+        arm = points - np.asarray(self.body_force_center)
+        return points @ self.acceleration + 0.5 * ((arm @ self.gradient) * arm).sum(axis=1)
+
+    @cached_property
+    def peak_acceleration(self) -> float:
+        """The largest acceleration where material starts [m/s^2]."""
+        points = [np.asarray(self.body_force_center)[None, :]]
+        points += [np.asarray(body.center) + CORNERS * body.extent for body in self.bodies]
+        points += [] if self.track is None else [self.track.position]
+        arm = np.concatenate(points) - np.asarray(self.body_force_center)
+        return float(np.linalg.norm(self.acceleration + arm @ self.gradient.T, axis=1).max())
+
+    @cached_property
+    def reference_speed(self) -> float:
+        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, expanding, or sqrt(g H)."""
+        g = float(np.linalg.norm(self.acceleration))
+        speeds, height = [1e-3], 0.0
+        if self.nozzle is not None and self.toolpath is not None and self.track is not None:
+            speeds.append(math.hypot(self.nozzle.speed, self.toolpath.speed))
+            height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
+        for body in self.bodies:
+            speeds.append(body.top_speed)
+            speeds.append(math.sqrt(np.abs(self.gradient).max()) * float(np.linalg.norm(body.extent)))
+            height = max(height, float(body.center[2] + body.extent[2]) - self.domain.lower[2])
+        if (expansion := self.material.expansion) is not None:
+            sizes = [float(np.linalg.norm(body.extent)) for body in self.bodies]
+            sizes += [self.nozzle.diameter / 2] if self.nozzle is not None else []
+            speeds.append(expansion.speed(max(sizes)))
+        return max(*speeds, math.sqrt(g * height))
+
+    @property
+    def liquid_sound_speed(self) -> float:
+        """Artificial sound speed of a liquid [m/s]: `sound_speed_ratio` times the reference speed (Monaghan 1994)."""
+        return self.sound_speed_ratio * self.reference_speed
+
+    @property
+    def wave_speed(self) -> float:
+        """Longitudinal wave speed of the fresh material [m/s]."""
+        return self.material.wave_speed(self.liquid_sound_speed)
+
+    @cached_property
+    def aged(self) -> tuple[np.ndarray, list[Material]]:
+        """(ages (n,) [s], the material at each): fresh alone where nothing changes."""
+        if not self.material.changes:
+            return np.zeros(1), [self.material]
+        ages = np.linspace(0.0, self.duration, AGES)
+        return ages, self.material.by_age(ages.tolist())
+
+    @property
+    def top_wave_speed(self) -> float:
+        """Longitudinal wave speed of the stiffest and lightest material of the whole run [m/s]."""
+        return max(m.wave_speed(self.liquid_sound_speed) for m in self.aged[1])
+
+    def made_of(self, material: Material) -> "Scenario":
+        """The same scenario as if all its material were this."""
+        made = self.model_copy(update={"material": material})
+        if self.track is not None:
+            vars(made)["track"] = self.track  # no matter of the material, and dear to lay out
+        return made
+
+    @cached_property
+    def schedule(self) -> tuple[float, int, int]:
+        """(tick [s], ticks in all, ticks between outputs).
+
+        A tick is the common clock of all methods: emission happens at its edges, so every method is fed the same
+        stream. By default matter moves at most a quarter of a spacing in it.
+        """
+        interval = min(self.output_interval or self.duration / 20.0, self.duration)
+        wanted = min(self.tick or 0.25 * self.spacing / self.reference_speed, interval)
+        per_output = max(1, math.ceil(interval / wanted - 1e-9))
+        tick = interval / per_output
+        return tick, max(1, round(self.duration / tick)), per_output
+
+    def warnings(self) -> list[str]:
+        """Values whose order of magnitude suggests a wrong unit."""
+        m, out = self.material, []
+        plausible = (
+            ("material.density", m.density, 10, 2e4, "kg/m^3"),
+            ("material.youngs_modulus", m.youngs_modulus, 10, 1e12, "Pa"),
+            ("material.viscosity", m.viscosity or None, 1e-6, 1e6, "Pa s"),
+            ("material.yield_stress", m.yield_stress or None, 1e-2, 1e8, "Pa"),
+            ("spacing", self.spacing, 1e-5, 0.2, "m"),
+            ("nozzle.diameter", self.nozzle and self.nozzle.diameter, 1e-4, 0.5, "m"),
+            ("nozzle speed", self.nozzle and self.nozzle.speed, 1e-5, 50, "m/s"),
+            ("toolpath.speed", self.toolpath and (self.toolpath.speed or None), 1e-5, 50, "m/s"),
+            ("gravity", float(np.linalg.norm(self.gravity)) or None, 0.1, 100, "m/s^2"),
+        )
+        for key, value, low, high, unit in plausible:
+            if value is not None and not low <= value <= high:
+                out.append(f"{key} = {value:g} {unit} is outside the usual {low:g} .. {high:g}; is it in {unit}?")
+        if self.wave_speed < 3 * self.reference_speed:
+            out.append(
+                f"the material's wave speed ({self.wave_speed:.3g} m/s) is below 3 times the scenario's speed "
+                f"({self.reference_speed:.3g} m/s): expect visible compression"
+            )
+        return out

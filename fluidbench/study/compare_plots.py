@@ -1,0 +1,105 @@
+"""The plots of a comparison: beads along and across the path, measures over time, cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from ..measure.bead import laid_share, measure_bead
+from ..measure.ledger import deposit_of
+from ..measure.reference import DoesNotApply, martin_moyce
+from ..method.frame import CARRIED
+from ..report.plot import Plot, Trace, colour
+from ..runs.record import Run
+from ..scenario import Scenario
+
+
+def plots(results: Sequence[Run]) -> list[Plot]:
+    """Every plot that the scenario gives rise to; only completed runs appear."""
+    done = [r for r in results if r.ok and r.record.repeat == 0]
+    if not done:
+        return []
+    scenario = done[0].scenario
+    beads = _bead_plots(done, scenario) if scenario.toolpath is not None else []
+    return [p for p in [*beads, *_series_plots(done, scenario), *_cost_plots(results)] if p.traces]
+
+
+def _bead_plots(done: Sequence[Run], scenario: Scenario) -> list[Plot]:
+    """Cross-sections over one another, width and height along the path."""
+    section = Plot(
+        "cross_section", "cross-section at the middle of the path", "across the path [mm]", "height [mm]", equal=True
+    )
+    width = Plot("width", "bead width along the path", "distance along the path [mm]", "width [mm]")
+    height = Plot("height", "bead height along the path", "distance along the path [mm]", "height [mm]")
+    for result in done:
+        frame = result.frame()
+        laid = laid_share(frame["birth_time"][frame["held"] != CARRIED], scenario)
+        bead = measure_bead(deposit_of(frame, scenario), scenario, laid)
+        if bead is None:
+            continue
+        for i, outline in enumerate(outlines(bead.middle.across, bead.middle.up, bead.middle.fill)):
+            label = result.label if i == 0 else ""
+            xs, ys = (1e3 * outline).T.tolist()
+            section.traces.append(Trace(label, xs, ys, colour=colour(result.label)))
+        along = (1e3 * bead.station).tolist()
+        width.traces.append(Trace(result.label, along, (1e3 * bead.width).tolist(), colour=colour(result.label)))
+        height.traces.append(Trace(result.label, along, (1e3 * bead.height).tolist(), colour=colour(result.label)))
+    return [section, width, height]
+
+
+def outlines(across: np.ndarray, up: np.ndarray, fill: np.ndarray) -> list[np.ndarray]:
+    """Contours of half filling, longest first, each (n, 2) [m]."""
+    import contourpy
+
+    lines = contourpy.contour_generator(across, up, fill.T).lines(0.5)
+    return sorted((np.asarray(line) for line in lines if len(line) > 8), key=len, reverse=True)
+
+
+def _series_plots(done: Sequence[Run], scenario: Scenario) -> list[Plot]:
+    """Measures over time, with the published points where there are some."""
+    wanted = {
+        "front_x_m": ("front", "front position", "front [m]"),
+        "slump": ("slump", "slump", "slump s' [-]"),
+        "top_m": ("top", "highest point of the deposit", "height [m]"),
+        "kinetic_energy_J": ("kinetic", "kinetic energy", "energy [J]"),
+    }
+    found = []
+    for column, (name, title, axis) in wanted.items():
+        plot = Plot(name, title, "time [s]", axis)
+        for result in done:
+            series = result.series
+            if column in series:
+                plot.traces.append(
+                    Trace(result.label, series["time_s"].tolist(), series[column].tolist(), colour=colour(result.label))
+                )
+        if column == "front_x_m" and scenario.reference == "martin_moyce_front" and plot.traces:
+            with suppress(DoesNotApply):  # said beside the table of references
+                plot.traces.append(_martin_moyce(scenario))
+        found.append(plot)
+    return found
+
+
+def _martin_moyce(scenario: Scenario) -> Trace:
+    a, rate, data = martin_moyce(scenario)
+    clock = (data["T"] / rate).tolist()
+    return Trace("Martin & Moyce 1952 (gate clock)", clock, (a * data["Z"]).tolist(), style="points")
+
+
+def _cost_plots(results: Sequence[Run]) -> list[Plot]:
+    """What each method cost; several repeats give several bars."""
+    bars = (
+        ("wall_per_simulated_s", "cost", "wall time per simulated second", "wall s / simulated s"),
+        ("particle_substeps_per_s", "throughput", "particle-substeps per second", "1 / s"),
+        ("mean_dt_s", "dt", "mean time step", "dt [s]"),
+    )
+    done = [r for r in results if r.ok]
+    found = []
+    for key, name, title, axis in bars:
+        plot = Plot(name, title, "", axis)
+        for result in done:
+            tag = result.label + (f" #{result.record.repeat + 1}" if result.record.repeat else "")
+            plot.traces.append(Trace(tag, [tag], [getattr(result.cost, key)], "bar", colour(result.label)))
+        found.append(plot)
+    return found

@@ -1,0 +1,46 @@
+"""What `compare` and `run` show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..method.verdict import Verdict
+from ..report.report import Report, machine_of, record_link
+from ..runs.record import Run
+from .compare_plots import plots
+from .compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
+from .compare_views import views
+
+ADVICE = {
+    Verdict.DIVERGED: "its results are left out of every comparison",
+    Verdict.OUT_OF_CAPACITY: "see the reason for the setting to raise",
+    Verdict.TIMEOUT: "raise --wall-limit, or use a larger --spacing",
+    Verdict.ERROR: "see log.txt in the run's folder",
+    Verdict.REFUSED: "change what it refuses, or leave the method out",
+}
+
+
+def report(runs: Sequence[Run], root: Path, verb: str) -> Report:
+    """Tables, plots and views of finished runs. `compare` has the folder's report.html; any other verb in the same
+    folder has files of its own, under its name."""
+    import pandas as pd
+
+    made = (fidelity(runs), successes(runs), against_reference(runs), costs(runs), backends(runs))
+    first = next((run for run in runs if run.record.input is not None), None)
+    return Report(
+        verb,
+        f"fluidbench {verb.partition('-')[0]}: {runs[0].record.scenario}",
+        first.scenario.title if first else "",
+        [],
+        [table for table in made if table is not None],
+        pd.DataFrame([{**run.record.row(), "reused": run.reused} for run in runs]),
+        plots(runs),
+        {"records": [record_link(run, root, f"{run.label} #{run.record.repeat + 1}") for run in runs]},
+        machine_of(runs),
+        alarms=failed_prints(runs),
+        failures=[f"{run.label}: {run.verdict}: {run.reason}; {ADVICE[run.verdict]}" for run in runs if not run.ok],
+        notes=[f"{run.label}: {line}" for run in runs if run.record.repeat == 0 for line in run.record.approximations],
+        images=views(runs),
+        prefix="" if verb == "compare" else f"{verb}-",
+    )

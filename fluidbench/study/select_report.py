@@ -1,0 +1,162 @@
+"""What `select` shows: the recommendation, every candidate, and the front of error against cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..report.plot import Plot, Trace, colour
+from ..report.report import Report, machine_of, record_link
+from ..report.table import Table, number
+from ..scenario import Scenario
+from .select import Candidate, Selection, confidence, physics_of
+
+GREY = "#bbbbbb"
+
+
+def report(
+    scenario: Scenario, name: str, chosen: Selection, tolerance: float, budget: float, pace: float, root: Path
+) -> Report:
+    import pandas as pd
+
+    front = chosen.front()
+    rows = [_row(c, c in front) for c in chosen.candidates]
+    runs = {"every method at every spacing": [record_link(r, root) for r in chosen.runs]}
+    return Report(
+        "select",
+        f"fluidbench select: {scenario.name}",
+        f"Tolerance {100 * tolerance:.3g} % of every length; budget: {_budget(budget, pace)}.",
+        _findings(scenario, name, chosen, tolerance, budget, pace),
+        [_candidates(chosen, front), _evidence(chosen)],
+        pd.DataFrame(rows),
+        [_plot(chosen, front)],
+        runs,
+        machine_of(chosen.runs),
+    )
+
+
+def _budget(budget: float, pace: float) -> str:
+    parts = [f"{budget:g} s"] if math.isfinite(budget) else []
+    parts += [f"{pace:g} wall s per simulated s"] if math.isfinite(pace) else []
+    return " and ".join(parts) or "none"
+
+
+def _words(c: Candidate) -> str:
+    return (
+        f"{c.method} at spacing {c.spacing:.4g} m (mean dt {c.dt:.3g} s): error {c.error:.1%} (discretisation "
+        f"{c.discretisation:.1%}, bias {c.bias:.1%}), {c.wall:.3g} s, {c.pace:.3g} wall s per simulated s"
+    )
+
+
+def _findings(
+    scenario: Scenario, name: str, chosen: Selection, tolerance: float, budget: float, pace: float
+) -> list[str]:
+    best, why = chosen.recommend(tolerance, budget, pace)
+    if best is None:
+        return [f"No recommendation: {why}.", *chosen.notes]
+    lines = [f"Tolerance {100 * tolerance:.3g} %; budget: {_budget(budget, pace)}."]
+    lines.append(f"Recommended: {_words(best)}." + (f" But {why}." if why else ""))
+    lines.append(
+        f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}{best.run.target.options}"
+    )
+    finer = [c for c in chosen.candidates if c.error <= best.error / 2]
+    faster = [c for c in chosen.candidates if c.wall <= best.wall / 2]
+    if finer:
+        lines.append(f"Twice as accurate: {_words(min(finer, key=lambda c: c.wall))}.")
+    else:
+        lines.append(f"Twice as accurate: nothing tried; {_further(chosen, best)}.")
+    if faster:
+        lines.append(f"Twice as fast: {_words(min(faster, key=lambda c: c.error))}.")
+    else:
+        lines.append("Twice as fast: nothing tried.")
+    lines.append(
+        f"How sure: {confidence(chosen, tolerance)} (known answers: {', '.join(sorted(physics_of(scenario)))})."
+    )
+    return [*lines, *chosen.notes]
+
+
+def _further(chosen: Selection, best: Candidate) -> str:
+    """What half the error would take, where the errors tried say so."""
+    if not chosen.converges(best.method):
+        return f"the error of {best.method} does not fall with the spacing, so a finer one promises nothing"
+    order = chosen.order(best.method)
+    if not math.isfinite(order):
+        return f"the error of {best.method} is nothing but what cannot be measured"
+    factor = 2.0 ** (1.0 / order)
+    return (
+        f"at its observed order of {order:.2g} it takes {1 / factor:.2g} of the spacing, {factor**4:.0f} times the work"
+    )
+
+
+def _row(c: Candidate, best: bool) -> dict[str, float | str | bool]:
+    return {
+        "method": c.method,
+        "spacing_m": c.spacing,
+        "mean_dt_s": c.dt,
+        "wall_s": c.wall,
+        "wall_per_simulated_s": c.pace,
+        "error": c.error,
+        "discretisation": c.discretisation,
+        "bias": c.bias,
+        "on_front": best,
+    }
+
+
+def _candidates(chosen: Selection, front: Sequence[Candidate]) -> Table:
+    table = Table(
+        "Every setting tried",
+        [
+            "method",
+            "spacing [m]",
+            "mean dt [s]",
+            "wall s",
+            "wall s / sim. s",
+            "error",
+            "discretisation",
+            "bias",
+            "front",
+        ],
+        note="error: of the worst length, relative; front: nothing tried is both faster and more accurate",
+    )
+    for c in sorted(chosen.candidates, key=lambda c: c.wall):
+        table.rows.append(
+            [
+                c.method,
+                number(c.spacing),
+                number(c.dt),
+                number(c.wall),
+                number(c.pace),
+                f"{c.error:.1%}",
+                f"{c.discretisation:.1%}",
+                f"{c.bias:.1%}",
+                "yes" if c in front else "-",
+            ]
+        )
+    return table
+
+
+def _evidence(chosen: Selection) -> Table:
+    keys = sorted({key for limits in chosen.limits.values() for key in limits})
+    table = Table(
+        "Limits at zero spacing, and trust",
+        ["method", *keys, "known answers passed", "trusted"],
+        note="limits: first order in the spacing; known answers of this physics: docs/validation.md",
+    )
+    for method, trust in chosen.trust.items():
+        cells = [number(chosen.limits.get(method, {}).get(key, math.nan)) for key in keys]
+        table.rows.append([method, *cells, f"{trust.passed} of {trust.judged}", "yes" if trust.trusted else "no"])
+    return table
+
+
+def _plot(chosen: Selection, front: Sequence[Candidate]) -> Plot:
+    """Error against cost; what is dominated is grey."""
+    plot = Plot("pareto", "error against cost", "wall time [s]", "estimated error [%]", log=True)
+    rest = [c for c in chosen.candidates if c not in front]
+    if rest:
+        plot.traces.append(Trace("dominated", [c.wall for c in rest], [100 * c.error for c in rest], "points", GREY))
+    for method in dict.fromkeys(c.method for c in front):
+        own = [c for c in front if c.method == method]
+        xs, ys = [c.wall for c in own], [100 * c.error for c in own]
+        plot.traces.append(Trace(method, xs, ys, "line+points", colour(method)))
+    return plot

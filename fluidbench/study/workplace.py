@@ -1,0 +1,186 @@
+"""Where and how the work of a study is done: what every verb takes beside its own arguments."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypedDict
+
+from ..errors import UserError, quoted, suggestion
+from ..method.suitability import check_backend
+from ..method.target import BACKENDS, DEFAULT_BACKEND, Target
+from ..registry import get_method, method_names
+from ..report.progress import Display, Line
+from ..runs.cluster import check_executor, executor_of
+from ..runs.execute import as_executor, execute
+from ..runs.store import Store
+from ..runs.work import Work
+from ..scenario import Scenario
+from ..scenario.library import load
+
+
+class Options(TypedDict, total=False):
+    """What every verb takes.
+
+    - device: "cpu" (default), "cuda:0", ...; "cuda" shares out all GPUs where timing does not matter
+    - backend: language of the kernels, "warp" (default) or "taichi"
+    - threads: CPU threads of taichi; with several, the last bits vary
+    - out: folder for the runs, where a later call finds them; default a temporary one that lives as long as the result
+    - fresh: run everything again, whatever is stored
+    - wall_limit: how long a run may take [s]; what cannot make it is stopped early
+    - jobs: runs at a time where timing does not matter; default 2, or 1 on CUDA
+    - executor: where runs happen instead of here: anything with the interface of concurrent.futures that reaches the
+      same folders, a dask Client, or a name such as "slurm" (runs/cluster.py)
+    - progress: whether to show it; default True
+    """
+
+    device: str
+    backend: str
+    threads: int
+    out: str | Path | None
+    fresh: bool
+    wall_limit: float
+    jobs: int | None
+    executor: Any
+    progress: bool
+
+
+@dataclass
+class Workplace:
+    """Options that were found to be possible."""
+
+    target: Target
+    store: Store
+    workers: int
+    wall_limit: float
+    executor: Any = None
+    progress: bool = True
+    gpus: tuple[str, ...] = ()  # to share out, where there are several
+    keeper: Any = None  # keeps a temporary folder as long as somebody holds it
+
+    @classmethod
+    def of(cls, options: Options, wall_limit: float, methods: Sequence[str] = ()) -> Workplace:
+        """Raises UserError for a device, a backend or a folder that is not there, and for a method that lacks the
+        backend; nothing is written."""
+        device = options.get("device", "cpu")
+        gpus = visible_gpus() if device == "cuda" else ()
+        device = "cuda:0" if device == "cuda" else device
+        target = one_target(device, options.get("backend", DEFAULT_BACKEND), options.get("threads", 1))
+        for method in methods:
+            check_backend(get_method(method), target)
+        workers, executor = len(gpus) or workers_for(options.get("jobs"), target), options.get("executor")
+        if isinstance(executor, str):
+            check_executor(executor)
+        elif executor is not None:
+            executor = as_executor(executor)
+        keeper = None
+        if (out := options.get("out")) is None:
+            keeper = tempfile.TemporaryDirectory(prefix="fluidbench-", ignore_cleanup_errors=True)
+            out = keeper.name
+        store = Store(Path(out).absolute(), options.get("fresh", False))
+        limit = options.get("wall_limit", wall_limit)
+        return cls(target, store, workers, limit, executor, options.get("progress", True), gpus, keeper)
+
+    def run(self, planned: Sequence[Work], title: str, together: bool = False, line: Line | None = None) -> list[Any]:
+        """Have work done and shown: one piece at a time, so that times mean something, unless it may run `together`."""
+        with Display(title, planned, line, quiet=not self.progress) as hooks:
+            workers, gpus = (self.workers, self.gpus) if together else (1, self.gpus[:1])
+            executor = self.executor
+            if isinstance(executor, str):
+                executor = executor_of(executor, self.store.root)
+            return execute(planned, self.store, hooks, workers, executor, gpus)
+
+
+def as_scenario(given: Scenario | str | Path, quick: bool = False) -> Scenario:
+    """A scenario, or the one meant by a name or a file."""
+    return given if isinstance(given, Scenario) else load(given, quick=quick)
+
+
+def methods_of(
+    given: Sequence[str] | str | None, options: Options | None = None, backends: Sequence[str] | None = None
+) -> list[str]:
+    """The methods named, or all that can be used here, on the device and through the backends (default: the one) of
+    these options; raises UserError with the nearest known name."""
+    if given is None:
+        options = options or {}
+        device = options.get("device", "cpu").partition(":")[0]
+        asked = set(backends or [options.get("backend", DEFAULT_BACKEND)])
+        able = [m for m in map(get_method, method_names()) if device in m.devices and asked <= set(m.backends)]
+        return [method.name for method in able if method.missing() is None]
+    names = [given] if isinstance(given, str) else list(given)
+    if not names:
+        raise UserError("no method is named")
+    for name in names:
+        if reason := get_method(name).missing():
+            raise UserError(reason)
+        if names.count(name) > 1:
+            raise UserError(f"{quoted(name)[1:-1]} is named twice")
+    return names
+
+
+def target_of(device: str, backend: str, threads: int) -> Target:
+    """Where to run; raises UserError unless the device exists and the backend is installed."""
+    if backend not in BACKENDS:
+        raise UserError(f"backend: no {quoted(backend)}{suggestion(backend, list(BACKENDS))}")
+    if find_spec(backend) is None:
+        raise UserError(f"the backend {backend} is not installed: pip install {BACKENDS[backend]}")
+    if threads > 4 * (os.cpu_count() or 1):
+        raise UserError(f"{threads} threads are more than this machine's {os.cpu_count()} cores can be shared among")
+    _check_device(device)
+    return Target(device, backend, threads)
+
+
+def one_target(device: str, backend: str, threads: int) -> Target:
+    """`target_of` for a verb with one backend; raises UserError for threads that it would not use."""
+    if "," in backend:
+        raise UserError(f"one backend is wanted here; got {quoted(backend)} (compare takes several)")
+    target = target_of(device, backend, threads)
+    if target.threads != threads:
+        raise UserError(f"{threads} threads are for taichi on the CPU; warp runs one thread there, a GPU its own")
+    return target
+
+
+def targets_of(device: str, backends: Sequence[str], threads: int) -> list[Target]:
+    """A target for each of several backends."""
+    if len(backends) == 1:
+        return [one_target(device, backends[0], threads)]
+    return [target_of(device, backend, threads) for backend in backends]
+
+
+def workers_for(jobs: int | None, target: Target) -> int:
+    """Runs at a time: as asked, or as many as two cores hold; one on a GPU."""
+    if jobs is not None and not 1 <= jobs <= 8 * (os.cpu_count() or 1):
+        raise UserError(f"{jobs} runs at a time are too many for this machine's {os.cpu_count()} cores, or too few")
+    return jobs or (max(1, 2 // target.threads) if target.device == "cpu" else 1)
+
+
+def visible_gpus() -> tuple[str, ...]:
+    """The GPUs that there are, in the words of CUDA_VISIBLE_DEVICES; raises UserError where there is none."""
+    import warp as wp
+
+    from ..native.device import quiet_warp
+
+    quiet_warp()
+    wp.init()
+    if not (found := len(wp.get_cuda_devices())):
+        raise UserError("no GPU on this machine (`fluidbench doctor`)")
+    given = os.environ.get("CUDA_VISIBLE_DEVICES", "")
+    return tuple(given.split(","))[:found] if given else tuple(map(str, range(found)))
+
+
+def _check_device(device: str) -> None:
+    if device == "cpu":
+        return
+    import warp as wp
+
+    from ..native.device import quiet_warp
+
+    quiet_warp()
+    wp.init()
+    known = ["cpu", *[d.alias for d in wp.get_cuda_devices()]]
+    if device not in known:
+        raise UserError(f"no device {quoted(device)} on this machine; it has {', '.join(known)} (`fluidbench doctor`)")
