@@ -16,19 +16,34 @@ from .test_cli import TINY, fluidbench
 
 EVERY = ["--checkpoint-every", "0.05"]
 FOAM = [
-    "--set", "spacing=0.003", "--set", "duration=0.3", "--set", "output_interval=0.03",
-    "--set", "toolpath.end=[0.03, 0.0]", "--set", "domain.upper=[0.06, 0.03, 0.06]", "--set", "pool=4000",
-    "--set", 'material.expansion={kind="growth", ratio=3.0, time=0.2, delay=0.05, jitter=0.02}',
-    "--set", 'material.cure={kind="linear", time=0.2, delay=0.1, youngs_modulus=1e4, yield_stress=300.0}',
-]  # fmt: skip
+    "--set",
+    "spacing=0.003",
+    "--set",
+    "duration=0.3",
+    "--set",
+    "output_interval=0.03",
+    "--set",
+    "toolpath.end=[0.03, 0.0]",
+    "--set",
+    "domain.upper=[0.06, 0.03, 0.06]",
+    "--set",
+    "pool=4000",
+    "--set",
+    'material.expansion={kind="growth", ratio=3.0, time=0.2, delay=0.05, jitter=0.02}',
+    "--set",
+    'material.cure={kind="linear", time=0.2, delay=0.1, youngs_modulus=1e4, yield_stress=300.0}',
+]
 
 
 def start(*arguments):
     """A process group of its own, so that a kill reaches the child of the run too, as that of a batch system does."""
     return subprocess.Popen(
-        [sys.executable, "-m", "fluidbench", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "fluidbench", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         start_new_session=True,
-    )  # fmt: skip
+    )
 
 
 def final(root):
@@ -160,12 +175,16 @@ def test_a_child_runs_with_no_standard_input_and_in_any_folder(tmp_path):
     for name in ("profile", "types", "random", "warp", "numpy"):
         (tmp_path / f"{name}.py").write_text("raise ImportError('a file of the user')\n")
     done = subprocess.run(
-        [sys.executable, "-P", "-m", "fluidbench", "run", "line_bead", *TINY, "--out", "out"], cwd=tmp_path,
-        stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-P", "-m", "fluidbench", "run", "line_bead", *TINY, "--out", "out"],
+        cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     (folder,) = (tmp_path / "out" / "runs").iterdir()
     (folder / "record.json").unlink()
-    alone = [sys.executable, "-P", "-m", "fluidbench.run", str(folder)]
+    alone = [sys.executable, "-P", "-m", "fluidbench.runs.process", str(folder)]
     done = subprocess.run(alone, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and json.loads((folder / "record.json").read_text())["verdict"] == "completed"

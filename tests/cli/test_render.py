@@ -14,10 +14,23 @@ def tower(tmp_path_factory):
     """A small growing, curing tower of two rings."""
     out = tmp_path_factory.mktemp("tower")
     done = fluidbench(
-        "run", "ring_tower_expansion_curing", "--quick", "--set", "duration=2.4", "--set", "toolpath.radius=0.05",
-        "--set", "toolpath.pause=0.2", "--set", "output_interval=0.4", "--frames", "--render-every", "0.8",
-        "--out", str(out),
-    )  # fmt: skip
+        "run",
+        "ring_tower_expansion_curing",
+        "--quick",
+        "--set",
+        "duration=2.4",
+        "--set",
+        "toolpath.radius=0.05",
+        "--set",
+        "toolpath.pause=0.2",
+        "--set",
+        "output_interval=0.4",
+        "--frames",
+        "--render-every",
+        "0.8",
+        "--out",
+        str(out),
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done, next((out / "runs").iterdir())
 

@@ -40,20 +40,34 @@ def test_the_page_opens_without_a_network_or_an_error(stability, tmp_path):
     shot = tmp_path / "page.png"
     assert CHROMIUM is not None
     seen = subprocess.run(
-        [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0",
-         "--virtual-time-budget=8000", "--host-resolver-rules=MAP * ~NOTFOUND", f"--screenshot={shot}", "--dump-dom",
-         (out / "report.html").as_uri()],
-        capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
+        [
+            CHROMIUM,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--v=0",
+            "--virtual-time-budget=8000",
+            "--host-resolver-rules=MAP * ~NOTFOUND",
+            f"--screenshot={shot}",
+            "--dump-dom",
+            (out / "report.html").as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert "CONSOLE" not in seen.stderr, seen.stderr
     assert seen.stdout.count('class="main-svg"') >= 1 and "Findings" in seen.stdout
 
 
 def test_ablate_and_select_refuse_nonsense(tmp_path):
     for command in (
-        ["select", "line_bead", "--budget", "soon"], ["ablate", "line_bead", "--tolerance", "much"],
-        ["stability", "--axis", "viscocity"], ["table1", "--device", "cuda:9"],
-    ):  # fmt: skip
+        ["select", "line_bead", "--budget", "soon"],
+        ["ablate", "line_bead", "--tolerance", "much"],
+        ["stability", "--axis", "viscocity"],
+        ["table1", "--device", "cuda:9"],
+    ):
         done = fluidbench(*command, "--out", str(tmp_path / "never"))
         assert done.returncode == 2 and "fluidbench: " in done.stderr and "Traceback" not in done.stderr
     assert not (tmp_path / "never").exists()

@@ -5,9 +5,11 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from fluidbench.scene import Box, Force, force_at
-from fluidbench.solver import Config, Solver
-from fluidbench.timestep import Bound
+from fluidbench.method.contract import Config
+from fluidbench.method.features import Feature
+from fluidbench.method.timestep import Bound
+from fluidbench.native.scene import Box, Force, force_at
+from fluidbench.native.solver import Solver
 
 wp.set_module_options({"enable_backward": False})
 
@@ -42,7 +44,7 @@ class Ballistic(Solver):
 
     name = "ballistic"
     paradigm = "projectiles"
-    features: ClassVar = frozenset()
+    features: ClassVar = frozenset(Feature)
     Config: ClassVar = Config
     passes = ("fly",)
 
@@ -57,6 +59,9 @@ class Ballistic(Solver):
         pool, scene = self.pool, self.scene
         inputs: list[Any] = [pool.capacity, pool.count, scene.dt, scene.force, pool.held, scene.box]
         wp.launch(fly, pool.size, [*inputs, pool.position, pool.velocity], device=scene.device)
+
+    def harden(self, due) -> None:
+        wp.copy(self.pool.phase, due)
 
     def densities(self) -> np.ndarray:
         return np.full(self.pool.size, self.scene.scenario.material.density)

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.simulation import Simulation, Verdict
-from fluidbench.solver import get_solver
-from fluidbench.target import Target
+from fluidbench.method.target import Target
+from fluidbench.method.verdict import Verdict
+from fluidbench.native.simulation import Simulation
+from fluidbench.registry import get_method
 
-from ..conftest import bead, scenario
+from ..conftest import bead, drive, scenario
 from .test_contract import METHODS
 
 BROKEN = (np.nan, np.inf, -np.inf, 1e30)
@@ -36,7 +37,7 @@ def broken_run(method, material, field, value, target=None):
             values[3] = value
             sim.pool.fields[field].assign(values)
 
-    return sim.run(observe), seen[1] if len(seen) > 1 else None, sim.tick
+    return drive(sim, observe), seen[1] if len(seen) > 1 else None, sim.tick
 
 
 def fields_of(method, material, kind="f"):
@@ -67,7 +68,7 @@ def test_a_broken_phase_or_hold_is_found_before_it_is_an_address(method):
 @pytest.mark.parametrize("method", ["mpm", "sph", "pbd"])
 def test_taichi_finds_it_too(method, field):
     pytest.importorskip("taichi")
-    if field in fields_of(get_solver(method), "paste"):
+    if field in fields_of(get_method(method), "paste"):
         for value in BROKEN:
             assert broken_run(method, "paste", field, value, Target(backend="taichi"))[0].verdict is Verdict.DIVERGED
 
@@ -86,7 +87,7 @@ def test_a_particle_thrown_between_substeps_is_not_hidden_by_the_walls(method, s
         pytest.importorskip("taichi")
     sim = Simulation(scenario(spacing=0.016), method, Target(backend=backend), graphs=False)
     sim.prepare()
-    sim.advance()
+    sim.advance_tick()
     assert sim.look().complaint is None
     wp.launch(throw, 1, [sim.pool.velocity, speed], device="cpu")
     sim._run(3)
@@ -97,4 +98,4 @@ def test_a_particle_thrown_between_substeps_is_not_hidden_by_the_walls(method, s
 def test_gravity_that_is_not_finite_never_yields_a_result(method):
     s = bead(duration=0.05)
     bad = s.model_copy(update={"gravity": (0.0, 0.0, float("nan"))})
-    assert Simulation(bad, method).run().verdict is Verdict.DIVERGED
+    assert drive(Simulation(bad, method)).verdict is Verdict.DIVERGED

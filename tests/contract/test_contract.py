@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from fluidbench.particles import CLAMPED
-from fluidbench.process.stream import Stream
-from fluidbench.simulation import Simulation, Verdict
-from fluidbench.solver import configure, get_solver, solver_names
+from fluidbench.method.frame import CLAMPED
+from fluidbench.method.verdict import Verdict
+from fluidbench.native.simulation import Simulation
+from fluidbench.registry import get_method
+from fluidbench.scenario.numerics import configure
+from fluidbench.scenario.stream import Stream
 
-from ..conftest import G, bead, center_of_mass, scenario
+from ..conftest import NATIVE, G, bead, center_of_mass, drive, scenario
 from .ballistic import Ballistic
 
-METHODS = [*map(get_solver, solver_names()), Ballistic]
+METHODS = [*map(get_method, NATIVE), Ballistic]
 every_method = pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
 
 
@@ -25,13 +27,13 @@ def drop(**table):
 
 @every_method
 def test_free_fall_is_exact_but_for_the_integrator(method):
-    """x = x0 + v0 t + g (t^2 + sum dt^2) / 2 for symplectic Euler, and the shape is kept (validation A)."""
+    """x = x0 + v0 t + g (t^2 + sum dt^2) / 2 for symplectic Euler, and the shape is kept (references.md, A)."""
     sim = Simulation(drop(), method)
     before = sim.pool.snapshot()
     sim.prepare()
     squares = 0.0
     while sim.done < sim.ticks:
-        plan = sim.advance()
+        plan = sim.advance_tick()
         squares += plan.substeps * plan.dt**2
         sim.look()
     after, t = sim.pool.snapshot(), sim.now
@@ -47,14 +49,16 @@ def test_free_fall_is_exact_but_for_the_integrator(method):
 def test_mass_and_momentum_are_conserved_in_free_flight(method):
     """sum m is exact; P = P0 + M g t to single precision, with internal forces at work (a spinning, straining drop)."""
     body = {
-        "kind": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.05, "velocity_gradient":
-        [[5.0, -8.0, 0.0], [8.0, 5.0, 0.0], [0.0, 0.0, -10.0]],
-    }  # fmt: skip
+        "kind": "sphere",
+        "center": [0.5, 0.5, 0.5],
+        "radius": 0.05,
+        "velocity_gradient": [[5.0, -8.0, 0.0], [8.0, 5.0, 0.0], [0.0, 0.0, -10.0]],
+    }
     s = scenario(domain={"lower": [0, 0, 0], "upper": [1, 1, 1]}, bodies=[body], duration=0.02)
     sim = Simulation(s, method)
     m = sim.pool.snapshot()["mass"].astype(float)
     start = m @ sim.pool.snapshot()["velocity"].astype(float)
-    assert sim.run().verdict is Verdict.COMPLETED
+    assert drive(sim).verdict is Verdict.COMPLETED
     end = sim.pool.snapshot()
     momentum = end["mass"].astype(float) @ end["velocity"].astype(float)
     impulse = np.array([0.0, 0.0, -G * sim.now]) * m.sum()
@@ -70,7 +74,7 @@ def test_emission_is_exact_in_mass_and_the_same_for_all(method):
     sim.prepare()
     seen: dict[int, tuple] = {}
     while sim.done < sim.ticks:
-        sim.advance()
+        sim.advance_tick()
         sim.look()
         sim.emission.advance(sim.now, sim.tick)
         frame = sim.pool.snapshot()
@@ -86,7 +90,7 @@ def test_emission_is_exact_in_mass_and_the_same_for_all(method):
     reference.prepare()
     other: dict[int, tuple] = {}
     while reference.done < reference.ticks:
-        reference.advance()
+        reference.advance_tick()
         reference.emission.advance(reference.now, reference.tick)
         frame = reference.pool.snapshot()
         for i in np.flatnonzero(frame["held"] == 0):
@@ -100,7 +104,7 @@ def test_same_seed_same_bits(method):
     frames = []
     for _ in range(2):
         sim = Simulation(scenario(jitter=0.2, seed=3), method)
-        sim.run()
+        drive(sim)
         frames.append(sim.pool.snapshot())
     assert all(np.array_equal(frames[0][key], frames[1][key]) for key in frames[0])
 
@@ -111,14 +115,14 @@ def test_worlds_agree_with_single_runs(method):
 
     def paste(stress):
         material = {"density": 1000.0, "youngs_modulus": 2e4, "yield_stress": stress, "plastic_viscosity": 5.0}
-        return scenario(material=material, duration=0.03, spacing=0.016)  # fmt: skip
+        return scenario(material=material, duration=0.03, spacing=0.016)
 
     scenarios = [paste(stress) for stress in (20.0, 60.0, 180.0, 540.0)]
     together = Simulation(scenarios, method)
-    together.run()
+    drive(together)
     for world, single in enumerate(scenarios):
         alone = Simulation(single, method)
-        alone.run()
+        drive(alone)
         a, b = together.pool.snapshot(world), alone.pool.snapshot()
         assert np.allclose(a["position"], b["position"], atol=1e-3 * single.spacing)
 
@@ -129,7 +133,7 @@ def test_graph_and_eager_execution_agree(method):
     ends = []
     for graphs in (True, False):
         sim = Simulation(scenario(), method, graphs=graphs)
-        sim.run()
+        drive(sim)
         ends.append(sim.pool.snapshot()["position"])
     assert np.array_equal(*ends)
 
@@ -140,7 +144,7 @@ def test_nothing_leaves_the_domain(method):
     body = {"kind": "box", "center": [0.05, 0.05, 0.05], "size": [0.06, 0.06, 0.06], "velocity": [-2.0, -2.0, -2.0]}
     s = scenario(bodies=[body], duration=0.1)
     sim = Simulation(s, method)
-    assert sim.run().verdict is Verdict.COMPLETED
+    assert drive(sim).verdict is Verdict.COMPLETED
     if method is not Ballistic:  # which knows no side walls
         assert s.domain.contains(sim.pool.snapshot()["position"]).all()
 
@@ -155,7 +159,10 @@ def test_bounds_are_named_and_explained(method):
 @every_method
 def test_footprint_counts_bytes(method):
     sim = Simulation(scenario(), method)
-    assert all(size > 0 for size in sim.solver.footprint().values())
+    found, own = sim.footprint(), sim.solver.footprint()
+    assert found["pool.position"] == 12 * sim.pool.size == sim.pool.position.capacity
+    assert {name for name in found if name.startswith("solver.")} == {f"solver.{name}" for name in own}
+    assert all(size > 0 for size in found.values()) and bool(own) == (method is not Ballistic)
 
 
 @every_method
@@ -163,13 +170,16 @@ def test_a_force_field_makes_a_drop_swing(method):
     """In a pull -Omega^2 (x - x0) the centre of a drop swings as cos(Omega t), whatever happens inside."""
     omega, centre = 20.0, np.array([0.2, 0.2, 0.2])
     s = scenario(
-        domain={"lower": [0, 0, 0], "upper": [0.4, 0.4, 0.4]}, gravity=[0.0, 0.0, 0.0], duration=0.1,
+        domain={"lower": [0, 0, 0], "upper": [0.4, 0.4, 0.4]},
+        gravity=[0.0, 0.0, 0.0],
+        duration=0.1,
         bodies=[{"kind": "sphere", "center": [0.24, 0.2, 0.2], "radius": 0.04}],
-        body_force_gradient=np.diag([-(omega**2)] * 3).tolist(), body_force_center=centre.tolist(),
-    )  # fmt: skip
+        body_force_gradient=np.diag([-(omega**2)] * 3).tolist(),
+        body_force_center=centre.tolist(),
+    )
     sim = Simulation(s, method)
     start = center_of_mass(sim.pool.snapshot()) - centre
-    assert sim.run().verdict is Verdict.COMPLETED
+    assert drive(sim).verdict is Verdict.COMPLETED
     end = center_of_mass(sim.pool.snapshot()) - centre
     assert np.abs(end - start * np.cos(omega * sim.now)).max() < 0.02 * np.linalg.norm(start)
 
@@ -178,14 +188,19 @@ def test_a_force_field_makes_a_drop_swing(method):
 def test_a_clamped_body_keeps_its_velocity(method):
     """A clamp moves on at its own speed through gravity, and through what leans on it."""
     bodies = [
-        {"kind": "box", "center": [0.06, 0.1, 0.1], "size": [0.04, 0.04, 0.04], "velocity": [0.1, 0, 0],
-         "clamped": True},
+        {
+            "kind": "box",
+            "center": [0.06, 0.1, 0.1],
+            "size": [0.04, 0.04, 0.04],
+            "velocity": [0.1, 0, 0],
+            "clamped": True,
+        },
         {"kind": "box", "center": [0.11, 0.1, 0.1], "size": [0.06, 0.04, 0.04]},
-    ]  # fmt: skip
+    ]
     s = scenario(bodies=bodies, material={"density": 1000.0, "youngs_modulus": 1e5}, duration=0.05)
     sim = Simulation(s, method)
     before = sim.pool.snapshot()
-    assert sim.run().verdict is Verdict.COMPLETED
+    assert drive(sim).verdict is Verdict.COMPLETED
     after, clamped = sim.pool.snapshot(), before["held"] == CLAMPED
     moved = after["position"][clamped] - before["position"][clamped]
     assert np.allclose(moved, [0.1 * sim.now, 0.0, 0.0], atol=1e-5)

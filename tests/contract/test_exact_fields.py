@@ -6,7 +6,7 @@ A layer 24 particles thick, periodic along x and y, without gravity; only its mi
 import numpy as np
 import pytest
 
-from fluidbench.simulation import Simulation
+from fluidbench.native.simulation import Simulation
 
 from ..conftest import scenario
 
@@ -18,9 +18,15 @@ MIDDLE = 0.5 * LAYERS * D + 8 * D
 def layer(method, **material):
     """(simulation, heights above the middle of all slots, slots of the middle)."""
     top = (LAYERS + 16) * D
-    s = scenario(domain={"lower": [0, 0, 0], "upper": [8 * D, 8 * D, top], "walls": WALLS}, gravity=[0, 0, 0],
-                 bodies=[{"kind": "box", "center": [4 * D, 4 * D, MIDDLE], "size": [8 * D, 8 * D, LAYERS * D]}],
-                 material={"density": RHO, **material}, spacing=D, duration=1.0, tick=0.1)  # fmt: skip
+    s = scenario(
+        domain={"lower": [0, 0, 0], "upper": [8 * D, 8 * D, top], "walls": WALLS},
+        gravity=[0, 0, 0],
+        bodies=[{"kind": "box", "center": [4 * D, 4 * D, MIDDLE], "size": [8 * D, 8 * D, LAYERS * D]}],
+        material={"density": RHO, **material},
+        spacing=D,
+        duration=1.0,
+        tick=0.1,
+    )
     sim = Simulation(s, method, graphs=False)
     sim.prepare()
     z = sim.pool.position.numpy()[:, 2].astype(float) - MIDDLE

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from fluidbench.particles import FAULT_ASTRAY, FAULT_STATE
-from fluidbench.simulation import Simulation, Verdict
+from fluidbench.method.verdict import Verdict
+from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
+from fluidbench.native.simulation import Simulation
 
-from ..conftest import scenario
+from ..conftest import drive, scenario
 
 METHODS = ["mpm", "sph", "pbd"]
 SOLID = {"density": 1000.0, "youngs_modulus": 2e4}
@@ -21,12 +22,18 @@ EVERY_AXIS = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower",
 def test_what_crosses_a_periodic_face_comes_in_at_the_other(method, material):
     """A full period of matter that flies through its three periodic axes keeps its lattice and its velocity."""
     edge, v = 0.12, np.array([0.5, -0.25, 0.125])
-    s = scenario(domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS}, gravity=[0, 0, 0], duration=0.1,
-                 bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3, "velocity": v.tolist()}],
-                 material=material, spacing=0.02, tick=0.01)  # fmt: skip
+    s = scenario(
+        domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS},
+        gravity=[0, 0, 0],
+        duration=0.1,
+        bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3, "velocity": v.tolist()}],
+        material=material,
+        spacing=0.02,
+        tick=0.01,
+    )
     sim = Simulation(s, method)
     before = sim.frame()["position"].astype(float)
-    assert sim.run().verdict is Verdict.COMPLETED
+    assert drive(sim).verdict is Verdict.COMPLETED
     after = sim.frame()
     apart = (after["position"] - before - v * sim.now + edge / 2) % edge - edge / 2
     assert np.abs(apart).max() < 1e-4 * edge and np.abs(after["velocity"] - v).max() < 1e-3
@@ -50,7 +57,7 @@ def sliding(method, walls, gravity=-10.0, top=False, speed=0.4, duration=0.03, m
         spacing=0.01,
     )
     sim = Simulation(s, method)
-    assert sim.run().verdict is Verdict.COMPLETED
+    assert drive(sim).verdict is Verdict.COMPLETED
     frame = sim.frame()
     return float(np.average(frame["velocity"][:, 0], weights=frame["mass"])), sim.now
 
@@ -83,10 +90,15 @@ def test_a_sheet_of_pbd_on_a_rough_face_slows_down_by_coulombs_law(friction, top
     for duration in (0.1, 0.2):
         z = 0.195 if top else 0.005
         body = {"kind": "box", "center": [0.16, 0.1, z], "size": [0.08, 0.08, 0.01], "velocity": [0.9, 0, 0]}
-        s = scenario(domain={"lower": [0, 0, 0], "upper": [0.4, 0.2, 0.2], "walls": walls}, bodies=[body],
-                     gravity=[0, 0, 10.0 if top else -10.0], material=SOLID, duration=duration)  # fmt: skip
+        s = scenario(
+            domain={"lower": [0, 0, 0], "upper": [0.4, 0.2, 0.2], "walls": walls},
+            bodies=[body],
+            gravity=[0, 0, 10.0 if top else -10.0],
+            material=SOLID,
+            duration=duration,
+        )
         sim = Simulation(s, "pbd")
-        assert sim.run().verdict is Verdict.COMPLETED
+        assert drive(sim).verdict is Verdict.COMPLETED
         speeds.append(float(sim.frame()["velocity"][:, 0].mean()))
     assert speeds[0] - speeds[1] == pytest.approx(10.0 * friction * 0.1, rel=0.01)
 
@@ -131,7 +143,7 @@ def test_a_state_that_no_matter_has_is_found_after_the_substep_that_meets_it(met
     """Broken between two substeps: the pass that advances it, or the audit that follows, marks it."""
     sim = Simulation(scenario(material=PASTE, spacing=0.016), method, graphs=False)
     sim.prepare()
-    sim.advance()
+    sim.advance_tick()
     assert sim.health.broken() is None
     values = sim.pool.fields[field].numpy().copy()
     values[5] = value
@@ -146,7 +158,7 @@ def test_sph_marks_densities_before_it_mends_them(density):
     """It keeps a density above a tenth of that at rest, which would hide what is broken from any audit."""
     sim = Simulation(scenario(material=PASTE, spacing=0.016), "sph", graphs=False)
     sim.prepare()
-    sim.advance()
+    sim.advance_tick()
     values = sim.pool.density.numpy().copy()
     values[5] = density
     sim.pool.density.assign(values)
@@ -158,7 +170,7 @@ def test_sph_marks_densities_before_it_mends_them(density):
 def test_a_particle_that_leaves_is_marked_by_the_pass_that_moves_it(method):
     sim = Simulation(scenario(material=PASTE, spacing=0.016), method, graphs=False)
     sim.prepare()
-    sim.advance()
+    sim.advance_tick()
     assert sim.health.broken() is None
     v = sim.pool.velocity.numpy().copy()
     v[5] = [0.0, 0.0, 1e9]
@@ -194,9 +206,13 @@ def test_pbd_leaves_what_is_not_crowded_alone(gap):
 def test_the_density_of_sph_follows_its_lattice_at_its_rate(start):
     """d rho = dt f (c / h) (rho_lattice - rho), but for the tolerance, in a full period at rest."""
     edge = 0.12
-    s = scenario(domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS}, gravity=[0, 0, 0], spacing=0.01,
-                 bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}],
-                 material={"density": 1000.0, "sound_speed": 4.0})  # fmt: skip
+    s = scenario(
+        domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS},
+        gravity=[0, 0, 0],
+        spacing=0.01,
+        bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}],
+        material={"density": 1000.0, "sound_speed": 4.0},
+    )
     sim, dt = Simulation(s, "sph"), 1e-4
     sim.pool.density.fill_(1000.0 * start)
     sim.march(dt, 1)

@@ -6,39 +6,32 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fluidbench import checkpoint
-from fluidbench.checkpoint import Checkpoints
-from fluidbench.child import perform
-from fluidbench.run import Job
-from fluidbench.simulation import Outcome, Simulation, Verdict
-from fluidbench.store import read_record
+from fluidbench.method.verdict import Verdict
+from fluidbench.native.simulation import Simulation
+from fluidbench.runs import checkpoint
+from fluidbench.runs.checkpoint import Checkpoints
+from fluidbench.runs.child import perform
+from fluidbench.runs.drive import Drive, Outcome
+from fluidbench.runs.needs import BASE
+from fluidbench.runs.process import Job
+from fluidbench.runs.store import read_record
 from fluidbench.study.estimate import estimate
-from fluidbench.timestep import Bound
 
-from ..conftest import bead, scenario
-from .ballistic import Ballistic
-
-FALLING = {"duration": 1.0, "tick": 0.125, "output_interval": 0.25, "spacing": 0.02,
-           "domain": {"lower": [0, 0, -9.0], "upper": [1, 1, 1]},
-           "bodies": [{"kind": "box", "center": [0.5, 0.5, 0.9], "size": [0.04] * 3}]}  # fmt: skip
+from ..conftest import bead, drive, scenario
+from .falling import Stepping, falling
 
 
-class Stepping(Ballistic):
-    """Takes the steps that it is told to, and notes the speeds it was asked for."""
-
-    dt = 0.05
-
-    @classmethod
-    def bounds(cls, s, config, speed):
-        return [Bound("loose", 9.0, "", ""), Bound("told", cls.dt, f"{speed!r}", "")]
+def kept(tmp_path, sim, every=5.0, film=None):
+    return Checkpoints(tmp_path, every, {"key": "k"}, sim, [], film)
 
 
-def falling(method=Ballistic, **more):
-    return Simulation(scenario(**{**FALLING, **more}), method)
-
-
-def kept(tmp_path, sim, every=5.0, **identity):
-    return Checkpoints(tmp_path, every, {"key": "k", **identity}, sim, [])
+def after(sim, ticks):
+    """What a run has cost after so many ticks."""
+    driven = Drive(sim, sim.scenario)
+    sim.begin()
+    for _ in range(ticks):
+        driven.leg()
+    return driven.outcome
 
 
 def test_a_checkpoint_is_due_after_its_interval(tmp_path, monkeypatch):
@@ -46,7 +39,7 @@ def test_a_checkpoint_is_due_after_its_interval(tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoint.time, "monotonic", lambda: clock[0])
     points = kept(tmp_path, falling())
     assert [points.due() for clock[0] in (104.9, 105.0, 200.0)] == [False, True, True]
-    points.write(Outcome(Verdict.COMPLETED))
+    points.write(Outcome())
     assert [points.due() for clock[0] in (204.9, 205.0)] == [False, True]
     assert not kept(tmp_path, falling(), every=0.0).due()
 
@@ -57,28 +50,26 @@ def test_a_checkpoint_is_written_after_every_tick_that_is_due(tmp_path, monkeypa
     points = kept(tmp_path, sim)
     monkeypatch.setattr(points, "due", lambda: sim.done % 3 == 0)
     monkeypatch.setattr(points, "write", lambda outcome: written.append((sim.done, outcome.substeps)))
-    sim.run(checkpoints=points)
+    drive(sim, checkpoints=points)
     assert written == [(3, 9), (6, 18)]
     broken = falling(Stepping)
     broken.pool.fault.fill_(1024)
-    points.simulation, written[:] = broken, []
+    points.session, written[:] = broken, []
     monkeypatch.setattr(points, "due", lambda: True)
-    assert broken.run(checkpoints=points).verdict is Verdict.DIVERGED and written == []
+    assert drive(broken, checkpoints=points).verdict is Verdict.DIVERGED and written == []
 
 
 def test_a_run_goes_on_as_if_nothing_had_happened(tmp_path):
     whole = falling(Stepping)
-    expected = whole.run()
+    expected = drive(whole)
     first = falling(Stepping)
     points = kept(tmp_path, first, every=1e-9)
-    outcome = Outcome(Verdict.COMPLETED)
-    for _ in range(3):
-        first._tick(outcome, 1, None, None)
+    outcome = after(first, 3)
     points.rows.append({"time_s": 0.25})
     points.write(outcome)
     second = falling(Stepping)
     again = kept(tmp_path, second)
-    done = second.run(lambda s, _: again.rows.append({"time_s": s.now}), checkpoints=again)
+    done = drive(second, lambda s, _: again.rows.append({"time_s": s.now}), checkpoints=again)
     assert (done.verdict, done.time, done.substeps, done.binding) == (
         "completed",
         1.0,
@@ -91,41 +82,53 @@ def test_a_run_goes_on_as_if_nothing_had_happened(tmp_path):
     assert done.wall > outcome.wall > 0
     third = kept(tmp_path, falling(Stepping))
     third.resumed = 5
-    assert third.restore(Outcome(Verdict.COMPLETED)) and third.resumed == 1
+    assert third.restore(Outcome()) and third.resumed == 1
     third.discard()
-    assert not third.path.exists() and not third.restore(Outcome(Verdict.COMPLETED))
+    assert not third.path.exists() and not third.restore(Outcome())
     third.discard()
 
 
 @pytest.mark.parametrize("change", [{"key": "other"}, {"code": "x"}])
 def test_a_checkpoint_is_of_this_very_run(tmp_path, change):
-    kept(tmp_path, falling()).write(Outcome(Verdict.COMPLETED))
+    kept(tmp_path, falling()).write(Outcome())
     other = Checkpoints(tmp_path, 5.0, {"key": "k"} | change, falling(), [])
-    assert not other.restore(Outcome(Verdict.COMPLETED)) and other.resumed == 0 and other.simulation.done == 0
+    assert not other.restore(Outcome()) and other.resumed == 0 and other.session.done == 0
 
 
 def test_a_torn_checkpoint_is_no_checkpoint(tmp_path):
     points = kept(tmp_path, falling())
-    points.write(Outcome(Verdict.COMPLETED))
+    points.write(Outcome())
     whole = points.path.read_bytes()
     for torn in (whole[: len(whole) // 2], b"", b"junk"):
         points.path.write_bytes(torn)
-        assert not points.restore(Outcome(Verdict.COMPLETED))
+        assert not points.restore(Outcome())
     points.path.write_bytes(whole)
-    assert points.restore(Outcome(Verdict.COMPLETED))
+    assert points.restore(Outcome())
 
 
 def test_the_film_goes_on_with_its_next_picture(tmp_path):
-    sim = falling()
-    sim.film = SimpleNamespace(shots=3, next=0.7)
-    kept(tmp_path, sim).write(Outcome(Verdict.COMPLETED))
-    other = falling()
-    other.film = SimpleNamespace(shots=0, next=0.0)
-    assert kept(tmp_path, other).restore(Outcome(Verdict.COMPLETED))
-    assert (other.film.shots, other.film.next) == (3, 0.7)
-    kept(tmp_path, falling()).write(Outcome(Verdict.COMPLETED))  # by a run without pictures
-    other.film.shots = 5
-    assert kept(tmp_path, other).restore(Outcome(Verdict.COMPLETED)) and other.film.shots == 5
+    kept(tmp_path, falling(), film=SimpleNamespace(shots=3, next=0.7)).write(Outcome())
+    film = SimpleNamespace(shots=0, next=0.0)
+    assert kept(tmp_path, falling(), film=film).restore(Outcome())
+    assert (film.shots, film.next) == (3, 0.7)
+    kept(tmp_path, falling()).write(Outcome())  # by a run without pictures
+    film.shots = 5
+    assert kept(tmp_path, falling(), film=film).restore(Outcome()) and film.shots == 5
+
+
+def test_a_run_that_was_too_slow_goes_on_with_a_larger_limit(tmp_path):
+    sim, whole = falling(Stepping), falling(Stepping)
+    drive(whole)
+    assert drive(sim, checkpoints=kept(tmp_path, sim), wall_limit=0.0).verdict is Verdict.TIMEOUT
+    second = falling(Stepping)
+    again = kept(tmp_path, second)
+    done = drive(second, checkpoints=again, wall_limit=60.0)
+    assert (done.verdict, done.reason, done.substeps, again.resumed) == (Verdict.COMPLETED, "", 24, 1)
+    assert np.array_equal(second.frame()["position"], whole.frame()["position"])
+    again.discard()
+    none = falling(Stepping)
+    drive(none, checkpoints=kept(tmp_path, none, every=0.0), wall_limit=0.0)
+    assert not again.path.exists()  # where none are wanted
 
 
 # --- a run's own process
@@ -140,7 +143,7 @@ def test_a_run_leaves_its_record_series_and_frames(tmp_path):
     assert set(record["files"]) == {"series.parquet", "final.npz", *(f"frame_000{i}.npz" for i in range(3))}
     assert [t["time"] for t in told] == pytest.approx([0.0, 0.025, 0.05]) and {t["until"] for t in told} == {0.05}
     mass = record["measures"]["mass_kg"]
-    assert mass == pytest.approx(1000.0 * 0.08**3, rel=1e-5) and record["print"] == "" and record["success"] == []
+    assert mass == pytest.approx(1000.0 * 0.08**3, rel=1e-5) and record["print"] is None and record["success"] == []
     with np.load(tmp_path / "frame_0001.npz") as frame, np.load(tmp_path / "final.npz") as last:
         assert float(frame["time"]) == pytest.approx(0.025) and float(last["time"]) == pytest.approx(0.05)
     import pandas as pd
@@ -162,13 +165,13 @@ def test_launches_of_processes_are_told_by_tick(tmp_path):
     record, _ = read_record(tmp_path)
     sim = Simulation(s, "mpm")
     for _ in range(4):
-        sim.advance()
+        sim.advance_tick()
     assert record["launches"]["process_per_tick"] == sim.process_launches.count / 4 > 1
     assert "volume_growth" in record["measures"]
 
 
 def test_a_run_that_breaks_has_no_measures(tmp_path, monkeypatch):
-    monkeypatch.setattr("fluidbench.health.Health.broken", lambda self: "it broke")
+    monkeypatch.setattr("fluidbench.native.health.Health.broken", lambda self: "it broke")
     s = scenario(duration=0.02, tick=0.01, output_interval=0.02, spacing=0.02)
     perform(Job(s.model_dump(mode="json"), "mpm"), tmp_path, lambda _: None)
     record, _ = read_record(tmp_path)
@@ -186,7 +189,7 @@ def test_an_estimate_by_hand():
     found = estimate(s, Estimated)
     substeps = math.ceil(tick / 1e-3 - 1e-9) * ticks
     assert (found.method, found.refusal, found.substeps) == ("ballistic", None, substeps)
-    assert found.memory_bytes == 200.0 * found.particles and found.bounds[1].formula == repr(s.reference_speed)
+    assert found.memory_bytes == BASE + 200.0 * found.particles and found.bounds[1].formula == repr(s.reference_speed)
     assert found.wall_s == pytest.approx(substeps * found.particles * 0.75 / 1e4)
     short = estimate(bead(duration=0.2), Estimated)
     assert short.wall_s == pytest.approx(short.substeps * short.particles * 0.5 / 1e4)
@@ -200,13 +203,10 @@ def test_a_print_goes_on_with_its_stream_and_its_layers(tmp_path, stop):
     later = {"kind": "box", "center": [0.04, 0.01, 0.004], "size": [0.008] * 3, "start": 0.06}
     s = bead(duration=0.1, tick=0.01, bodies=[later])
     whole, first = Simulation(s, Stepping), Simulation(s, Stepping)
-    whole.run()
-    outcome = Outcome(Verdict.COMPLETED)
-    for _ in range(stop):
-        first._tick(outcome, 1, None, None)
-    kept(tmp_path, first).write(outcome)
+    drive(whole)
+    kept(tmp_path, first).write(after(first, stop))
     second = Simulation(s, Stepping)
-    second.run(checkpoints=kept(tmp_path, second))
+    drive(second, checkpoints=kept(tmp_path, second))
     assert second.pool.counts == whole.pool.counts and second.done == whole.done == 20
     for name, value in whole.frame().items():
         assert np.array_equal(second.frame()[name], value), name
@@ -215,8 +215,14 @@ def test_a_print_goes_on_with_its_stream_and_its_layers(tmp_path, stop):
 def test_matter_cures_as_the_run_goes_on():
     """A linear cure of a second, at the start of the last tick, which is at 0.45 s: level 45 of 100."""
     cure = {"kind": "linear", "time": 1.0, "youngs_modulus": 2e4}
-    s = scenario(duration=0.5, tick=0.05, output_interval=0.5, gravity=[0, 0, 0], spacing=0.02,
-                 material={"density": 1000.0, "youngs_modulus": 1e4, "yield_stress": 9e3, "cure": cure})  # fmt: skip
+    s = scenario(
+        duration=0.5,
+        tick=0.05,
+        output_interval=0.5,
+        gravity=[0, 0, 0],
+        spacing=0.02,
+        material={"density": 1000.0, "youngs_modulus": 1e4, "yield_stress": 9e3, "cure": cure},
+    )
     sim = Simulation(s, "mpm")
-    sim.run()
+    drive(sim)
     assert set(sim.frame()["phase"]) == {45}

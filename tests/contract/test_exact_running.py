@@ -6,56 +6,40 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fluidbench import simulation
-from fluidbench.simulation import Outcome, Simulation, Verdict
-from fluidbench.timestep import Bound
+from fluidbench.method.verdict import Verdict
+from fluidbench.native import simulation
+from fluidbench.native.simulation import Simulation
+from fluidbench.runs import drive as loop
+from fluidbench.runs.drive import Drive, Outcome
 
-from ..conftest import bead, scenario
-from .ballistic import Ballistic
-
-FALLING = {"duration": 1.0, "tick": 0.125, "output_interval": 0.25, "spacing": 0.02,
-           "domain": {"lower": [0, 0, -9.0], "upper": [1, 1, 1]},
-           "bodies": [{"kind": "box", "center": [0.5, 0.5, 0.9], "size": [0.04] * 3}]}  # fmt: skip
-
-
-class Stepping(Ballistic):
-    """Takes the steps that it is told to, and notes the speeds it was asked for."""
-
-    dt = 0.05
-
-    @classmethod
-    def bounds(cls, s, config, speed):
-        return [Bound("loose", 9.0, "", ""), Bound("told", cls.dt, f"{speed!r}", "")]
-
-
-def falling(method=Ballistic, **more):
-    return Simulation(scenario(**{**FALLING, **more}), method)
+from ..conftest import bead, drive, scenario
+from .falling import FALLING, Stepping, falling
 
 
 def test_outputs_come_at_their_ticks_and_the_first_before_all():
     sim, seen = falling(Stepping), []
-    outcome = sim.run(lambda s, vital: seen.append((s.now, s.done, vital.speed)))
+    outcome = drive(sim, lambda s, vital: seen.append((s.now, s.done, vital.speed)))
     assert [row[:2] for row in seen] == [(0.0, 0), (0.25, 2), (0.5, 4), (0.75, 6), (1.0, 8)]
     assert [row[2] for row in seen] == pytest.approx([9.81 * t for t in (0, 0.25, 0.5, 0.75, 1.0)], rel=1e-5)
-    assert (outcome.verdict, outcome.reason, outcome.time, outcome.ticks) == (Verdict.COMPLETED, "", 1.0, 8)
+    assert (outcome.verdict, outcome.reason, outcome.time, sim.done) == (Verdict.COMPLETED, "", 1.0, 8)
     assert outcome.substeps == 24 and outcome.particle_substeps == 24 * 8 and outcome.peak_particles == 8
     assert outcome.binding == {"told": 1.0} and outcome.wall > 0 and outcome.cpu >= 0 and outcome.prepare_wall >= 0
-    assert sim.substep_launches.count == 1 and (sim.tick, sim.ticks, sim.ticks_per_output) == (0.125, 8, 2)
+    assert sim.substep_launches.count == 1 and sim.scenario.schedule == (0.125, 8, 2)
 
 
 def test_clocks_run_only_while_the_loop_does(monkeypatch):
     """Clocks that go on by 1 and by 0.5 at every look: twice in preparing, and twice a tick."""
     wall, cpu = itertools.count(), itertools.count()
     clocks = SimpleNamespace(perf_counter=lambda: 1.0 * next(wall), process_time=lambda: 0.5 * next(cpu))
-    monkeypatch.setattr(simulation, "time", clocks)
-    outcome = falling(Stepping).run(lambda *_: next(wall))
+    monkeypatch.setattr(loop, "time", clocks)
+    outcome = drive(falling(Stepping), lambda *_: next(wall))
     assert (outcome.prepare_wall, outcome.wall, outcome.cpu) == (1.0, 8.0, 4.0)
 
 
 def test_the_last_tick_is_an_output_even_between_two():
     sim, seen = falling(duration=0.85, output_interval=0.375), []
-    sim.run(lambda s, _: seen.append(s.done))
-    assert (sim.ticks, sim.ticks_per_output, seen) == (7, 3, [0, 3, 6, 7])
+    drive(sim, lambda s, _: seen.append(s.done))
+    assert sim.scenario.schedule[1:] == (7, 3) and seen == [0, 3, 6, 7]
 
 
 def test_bounds_allow_a_quarter_more_speed_than_was_last_seen():
@@ -72,8 +56,13 @@ def test_bounds_allow_a_quarter_more_speed_than_was_last_seen():
 
 def test_bounds_are_of_the_material_that_will_be_there_after_the_tick():
     cure = {"kind": "jump", "delay": 0.2, "youngs_modulus": 4e4}
-    s = scenario(material={"density": 1000.0, "youngs_modulus": 1e4, "cure": cure}, duration=0.64, tick=0.01,
-                 output_interval=0.01, gravity=[0, 0, 0])  # fmt: skip
+    s = scenario(
+        material={"density": 1000.0, "youngs_modulus": 1e4, "cure": cure},
+        duration=0.64,
+        tick=0.01,
+        output_interval=0.01,
+        gravity=[0, 0, 0],
+    )
     sim = Simulation(s, "mpm")
     early = min(b.dt for b in sim.bounds())
     sim.done = 18  # ends at 0.19; materials are known at multiples of 10 ms, and that of 0.2 from there on
@@ -88,7 +77,7 @@ def test_a_tick_is_cut_into_equal_substeps_of_the_bound():
     """Three of a 24th of a second: v = -g t, z falls by g dt^2 (1 + 2 + 3)."""
     sim = falling(Stepping)
     before = sim.frame()["position"]
-    steps = sim.advance()
+    steps = sim.advance_tick()
     assert (steps.substeps, steps.dt, steps.binding.name, sim.done, sim.now) == (3, 0.125 / 3, "told", 1, 0.125)
     after = sim.frame()
     assert after["velocity"][:, 2] == pytest.approx(np.full(8, -9.81 * 0.125), rel=1e-6)
@@ -108,7 +97,7 @@ def test_every_32nd_tick_sorts_the_pool():
 
     sim = falling(Sorting, duration=8.125)
     assert sim.ticks == 65
-    sim.run()
+    drive(sim)
     assert sorted_at == [0, 32, 64] and simulation.SORT_TICKS == 32
 
 
@@ -139,46 +128,52 @@ def test_the_order_of_a_sort_is_that_of_the_keys():
     ],
 )
 def test_a_run_is_stopped_when_it_cannot_make_it(wall, done, limit, late):
-    sim = SimpleNamespace(ticks=100, done=done, now=0.5)
-    words = Simulation._too_slow(sim, Outcome(Verdict.COMPLETED, wall=wall), limit)
+    made = SimpleNamespace(schedule=(0.01, 100, 10))
+    words = Drive(SimpleNamespace(now=done / 100), made, wall_limit=limit, outcome=Outcome(wall=wall)).too_slow()
+    assert Drive(SimpleNamespace(now=done / 100), made, outcome=Outcome(wall=wall)).too_slow() is None
     assert (words is not None) is late
     if late:
         assert words == (
-            f"stopped at t = 0.5 s after {wall:.0f} s: at this pace the run takes at least {wall * 100 / done:.0f} s, "
-            f"the limit is {limit:.0f} s"
+            f"stopped at t = {done / 100:g} s after {wall:.0f} s: at this pace the run takes at least "
+            f"{wall * 100 / done:.0f} s, the limit is {limit:.0f} s"
         )
 
 
 def test_a_run_without_time_times_out_and_shows_no_more():
-    seen = []
-    outcome = falling().run(lambda s, _: seen.append(s.done), wall_limit=0.0)
-    assert outcome.verdict is Verdict.TIMEOUT and outcome.ticks == 1 and seen == [0]
-    assert outcome.reason.startswith("stopped at t = 0.125 s after 0 s")
+    for interval, shown in ((0.25, [0]), (0.125, [0, 1])):  # what is due at its end is shown still
+        sim, seen = falling(output_interval=interval), []
+        outcome = drive(sim, lambda s, _, seen=seen: seen.append(s.done), wall_limit=0.0)
+        assert outcome.verdict is Verdict.TIMEOUT and outcome.time == 0.125 and sim.done == 1 and seen == shown
+        assert outcome.reason.startswith("stopped at t = 0.125 s after 0 s")
 
 
 def test_what_breaks_ends_the_run_with_its_time_and_its_reason():
     class Full(Stepping):
         faults = {1: "too full", 4: "too long", 2: "not this"}
 
-    outcome = falling(Full).run()
-    assert outcome.verdict is Verdict.COMPLETED
+    assert drive(falling(Full)).verdict is Verdict.COMPLETED
     sim = falling(Full)
     sim.pool.fault.fill_(5)
-    outcome = sim.run()
+    outcome = drive(sim)
     assert (outcome.verdict, outcome.reason) == (Verdict.OUT_OF_CAPACITY, "at t = 0.125 s too full; too long")
     sim = falling(Full)
     sim.pool.fault.fill_(1 | 2048)  # a blow-up goes before what it filled
-    assert sim.run().verdict is Verdict.DIVERGED
+    assert drive(sim).verdict is Verdict.DIVERGED
     late = falling(Full)
-    late.film = SimpleNamespace(due=lambda now: now > 0.9, shoot=lambda s: s.pool.fault.fill_(1024))
-    outcome = late.run()  # broken after the last look, and found all the same
+    outcome = drive(
+        late, camera=SimpleNamespace(next=0.9, shoot=lambda s: s.pool.fault.fill_(1024))
+    )  # broken after the last look, and found all the same
     assert outcome.verdict is Verdict.DIVERGED and outcome.reason.startswith("at t = 1 s a particle was thrown")
     last = falling(Full)
-    last.film = SimpleNamespace(due=lambda now: now > 0.9, shoot=lambda s: s.pool.volume.fill_(float("nan")))
-    assert last.run().verdict is Verdict.DIVERGED
+    camera = SimpleNamespace(next=0.9, shoot=lambda s: s.pool.volume.fill_(float("nan")))
+    assert drive(last, camera=camera).verdict is Verdict.DIVERGED
+
+
+@pytest.mark.parametrize("start", [0.0, 0.5])
+def test_what_finds_no_room_ends_the_run(start):
     small = falling()
-    small.emission = SimpleNamespace(advance=lambda now, tick: small.pool.need(0, 99))
-    outcome = small.run()
+    small.emission = SimpleNamespace(advance=lambda now, tick: small.pool.need(0, 99 if now >= start else 0))
+    outcome = drive(small)
     assert outcome.verdict is Verdict.OUT_OF_CAPACITY and "and 107 are needed" in outcome.reason
 
 
@@ -203,28 +198,28 @@ class Told(Stepping):
 def test_a_method_is_told_once_of_what_changed_outside_a_substep():
     sim = falling(Told)
     for _ in range(2):
-        sim.advance()
+        sim.advance_tick()
     assert sim.solver.told == ["refresh"]
     sim.pool.stale = True
     sim.march(0.01, 1)
     assert sim.solver.told == ["refresh", "refresh"]
-    sim.go_on(sim.progress(), {name: array.numpy() for name, array in sim.arrays().items()})
+    sim.resume(*sim.state())
     assert sim.solver.told[2:] == ["resume"]
 
 
 def test_a_method_is_prepared_and_refreshed_before_the_first_look():
     sim, seen = falling(Told), []
-    sim.run(lambda s, _: seen.append(list(s.solver.told)))
+    drive(sim, lambda s, _: seen.append(list(s.solver.told)))
     assert seen[0] == ["prepare", "refresh"] and seen[-1] == seen[0]
 
 
 def test_launches_are_captured_or_waited_for():
     sim = Simulation(scenario(**FALLING), Told, graphs=False)
-    sim.advance()
+    sim.advance_tick()
     assert sim.solver.told == ["refresh", "wait", "wait"] and sim.substep_launches.count == 1
     assert not sim._graphs and list(falling()._graphs) == []
     captured = falling(Stepping)
-    captured.advance()
+    captured.advance_tick()
     assert list(captured._graphs) == [1] and captured._use_graphs
 
 
@@ -232,7 +227,7 @@ def test_layers_come_at_their_time_and_carry_no_spin():
     body = FALLING["bodies"][0]
     later = body | {"center": [0.2, 0.2, 0.9], "start": 0.5}
     sim, count = falling(Stepping, bodies=[body, later], gravity=[0, 0, 0]), []
-    sim.run(lambda s, _: count.append(s.pool.counts[0]))
+    drive(sim, lambda s, _: count.append(s.pool.counts[0]))
     assert count == [8, 8, 8, 16, 16] and not sim.frame()["spin"].any() and sim.frame()["spin"].shape == (16, 3)
     assert "stress" not in sim.frame() and (sim.frame()["density"] == 1000.0).all()
     assert set(sim.arrays()) == {f"pool.{name}" for name in (*sim.pool.fields, "count", "fault")}
@@ -242,5 +237,5 @@ def test_layers_come_at_their_time_and_carry_no_spin():
 def test_what_is_laid_at_the_start_is_seen_at_the_start():
     s = bead(duration=0.1)
     sim, seen = Simulation(s, Stepping), []
-    sim.run(lambda x, _: seen.append(len(x.frame()["mass"])))
+    drive(sim, lambda x, _: seen.append(len(x.frame()["mass"])))
     assert seen[0] > 0 and seen == sorted(seen)  # the nozzle is filled before the first look

@@ -3,21 +3,21 @@
 import pytest
 
 from fluidbench.measure.ledger import ledger, lengths
-from fluidbench.simulation import Simulation, Verdict
-from fluidbench.solver import solver_names
-from fluidbench.target import Target
+from fluidbench.method.target import Target
+from fluidbench.method.verdict import Verdict
+from fluidbench.native.simulation import Simulation
 
-from ..conftest import bead
+from ..conftest import NATIVE, bead, drive
 
 
 @pytest.mark.gpu
-@pytest.mark.parametrize("name", solver_names())
+@pytest.mark.parametrize("name", NATIVE)
 def test_cuda_agrees_with_the_cpu(name):
     s = bead(duration=0.4)
     rows = []
     for device in ("cpu", "cuda:0"):
         sim = Simulation(s, name, Target(device))
-        assert sim.run().verdict is Verdict.COMPLETED
+        assert drive(sim).verdict is Verdict.COMPLETED
         frame = sim.frame()
         rows.append({**ledger(frame, s), **lengths(frame, s)})
     assert rows[0]["mass_kg"] == rows[1]["mass_kg"]

@@ -20,19 +20,40 @@ from unittest.mock import patch
 import numpy as np
 
 TINY = (
-    "--set", "spacing=0.004", "--set", "duration=0.06", "--set", "output_interval=0.03",
-    "--set", "toolpath.end=[0.03, 0.0]", "--set", "domain.upper=[0.06, 0.03, 0.03]",
-)  # fmt: skip
+    "--set",
+    "spacing=0.004",
+    "--set",
+    "duration=0.06",
+    "--set",
+    "output_interval=0.03",
+    "--set",
+    "toolpath.end=[0.03, 0.0]",
+    "--set",
+    "domain.upper=[0.06, 0.03, 0.03]",
+)
 RESULTS = ("record.json", "series.parquet", "final.npz")  # without them a run is not finished
 BESIDE = ("job.json", "log.txt")
 PAGES = ("run-mpm.parquet", "run-mpm.csv", "run-mpm.html", "run-mpm-views.png")
 SHAPES = (
-    "[]", "5", "{}", "null", '"completed"', "NaN", '{"verdict": "completed"}', '{"verdict": 5}',
+    "[]",
+    "5",
+    "{}",
+    "null",
+    '"completed"',
+    "NaN",
+    '{"verdict": "completed"}',
+    '{"verdict": 5}',
     '{"verdict": ["completed"]}',
-    '{"verdict": null}', '[{"verdict": "completed"}]', '{"verdict": "completed", "measures": null, "cost": null}',
+    '{"verdict": null}',
+    '[{"verdict": "completed"}]',
+    '{"verdict": "completed", "measures": null, "cost": null}',
     '{"verdict": "completed", "measures": [], "cost": [], "method": "mpm", "device": "cpu", "backend": "warp"}',
-    '{"verdict": "diverged"}', '{"verdict": "refused"}', "[" * 5000, "9" * 5000, '{"a": ' * 2000,
-)  # fmt: skip
+    '{"verdict": "diverged"}',
+    '{"verdict": "refused"}',
+    "[" * 5000,
+    "9" * 5000,
+    '{"a": ' * 2000,
+)
 PNG = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c4890000000d49444154789c6360606060000000050001a5f645400000"
     "000049454e44ae426082"
@@ -70,12 +91,15 @@ class Fault:
             return
         path.unlink()
         new: dict[str, Callable[[], Any]] = {
-            "missing": lambda: None, "empty": path.touch, "folder": path.mkdir,
+            "missing": lambda: None,
+            "empty": path.touch,
+            "folder": path.mkdir,
             "truncated": lambda: path.write_bytes(data[: rng.randrange(1, max(2, len(data) - 1))]),
             "binary": lambda: path.write_bytes(rng.randbytes(len(data))),
             "full folder": lambda: (path.mkdir(), (path / "mine.txt").write_text("mine")),
-            "shape": lambda: path.write_text(self.value), "dangling link": lambda: path.symlink_to("nowhere"),
-        }  # fmt: skip
+            "shape": lambda: path.write_text(self.value),
+            "dangling link": lambda: path.symlink_to("nowhere"),
+        }
         new[self.way]()
 
 
@@ -94,7 +118,7 @@ class Child:
     started = 0
 
     def __init__(self, command: Any, **given: Any) -> None:
-        from fluidbench import run
+        from fluidbench.runs import process as run
 
         Child.started += 1
         said, self.returncode, self.pid = io.StringIO(), 0, os.getpid()
@@ -127,7 +151,7 @@ def children_in_process() -> Iterator[None]:
     real = subprocess.Popen
 
     def popen(command: Any, *rest: Any, **given: Any) -> Any:
-        own = isinstance(command, list) and "fluidbench.run" in command
+        own = isinstance(command, list) and "fluidbench.runs.process" in command
         return Child(command, **given) if own else real(command, *rest, **given)
 
     def savefig(_: Any, target: Any, **__: Any) -> None:
@@ -168,9 +192,13 @@ def failing_writes(root: Path, first: int, code: int) -> Iterator[list[str]]:
         return True
 
     plan: list[tuple[Any, str, int, Callable[..., bool]]] = [
-        (builtins, "open", 0, for_writing), (io, "open", 0, for_writing), (os, "open", 0, for_writing_fd),
-        (os, "mkdir", 0, always), (os, "replace", 1, always), (os, "rename", 1, always),
-    ]  # fmt: skip
+        (builtins, "open", 0, for_writing),
+        (io, "open", 0, for_writing),
+        (os, "open", 0, for_writing_fd),
+        (os, "mkdir", 0, always),
+        (os, "replace", 1, always),
+        (os, "rename", 1, always),
+    ]
     with contextlib.ExitStack() as stack:
         for module, name, which, writes in plan:
             stack.enter_context(patch.object(module, name, guard(getattr(module, name), which, writes)))

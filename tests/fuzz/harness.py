@@ -24,11 +24,10 @@ REFUSED, EITHER, ACCEPTED = "refused", "either", "accepted"
 LINES, CHARACTERS = 6, 2000  # a handful of lines, and what fits on a screen
 MEMORY = 3 * 2**30  # bytes that a case may ask for: on a bigger wish Python says MemoryError and the machine lives
 STUBS = {
-    "fluidbench.study.execute": ("execute",),
-    "fluidbench.study.experiments": ("run_tasks",),
+    "fluidbench.runs.execute": ("execute",),
     "fluidbench.study.validate": ("run",),
-    "fluidbench.run": ("launch",),
-    "fluidbench.child": ("perform",),
+    "fluidbench.runs.process": ("launch",),
+    "fluidbench.runs.child": ("perform",),
 }
 """What runs simulations: the entrances of the studies, and the child behind them."""
 
@@ -88,9 +87,12 @@ def fluidbench(arguments: Iterable[str], limit: int = 60) -> Outcome:
     out = io.TextIOWrapper(io.BytesIO(), "utf-8", "strict", write_through=True)
     err = io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True)  # as Python opens them
     with (
-        patch.object(sys, "argv", ["fluidbench", *arguments]), contextlib.redirect_stdout(out),
-        contextlib.redirect_stderr(err), warnings.catch_warnings(), _guarded(limit),
-    ):  # fmt: skip
+        patch.object(sys, "argv", ["fluidbench", *arguments]),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        warnings.catch_warnings(),
+        _guarded(limit),
+    ):
         warnings.simplefilter("ignore")  # pytest makes errors of them, the program does not
         try:
             main()
@@ -153,10 +155,10 @@ def _would_run(planned: Any = (), *_: Any, **__: Any) -> None:
 
 
 def _scenarios(planned: Any) -> Iterator[dict[str, Any]]:
-    """The scenario tables of jobs, of trials and of tasks."""
+    """The scenario tables of jobs, of trials and of experiments."""
     for item in planned if isinstance(planned, list | tuple) else [planned]:
-        if isinstance(item, tuple) and isinstance(item[-1], dict):
-            item = item[-1].get("scenario")
+        if hasattr(item, "task"):
+            item = item.task.get("scenario")
         for one in getattr(item, "jobs", {}).values() if hasattr(item, "jobs") else [item]:
             table = getattr(one, "scenario", one)
             if isinstance(table, dict):

@@ -11,10 +11,33 @@ from .leaves import CHOICE, FLAG, NUMBER, OWN, TEXT, VECTOR, Leaf, changed, leav
 from .toml import Raw, dump
 
 NUMBERS = (
-    "nan", "-nan", "inf", "-inf", '"text"', '""', "[]", "{}", "[1.0]", '"nan"', '"inf"', "1979-05-27", "text", "1.2.3",
-    '"' + "x" * 20_000 + '"', '"\\u0000\\u001b[31m"', '"ﬂüssig"', "9" * 400, "9" * 5000, "[" * 1200 + "]" * 1200,
-    "{a.b.c = 1}", "0x", "1e", "NaN", "Infinity", "∞",
-)  # fmt: skip
+    "nan",
+    "-nan",
+    "inf",
+    "-inf",
+    '"text"',
+    '""',
+    "[]",
+    "{}",
+    "[1.0]",
+    '"nan"',
+    '"inf"',
+    "1979-05-27",
+    "text",
+    "1.2.3",
+    '"' + "x" * 20_000 + '"',
+    '"\\u0000\\u001b[31m"',
+    '"ﬂüssig"',
+    "9" * 400,
+    "9" * 5000,
+    "[" * 1200 + "]" * 1200,
+    "{a.b.c = 1}",
+    "0x",
+    "1e",
+    "NaN",
+    "Infinity",
+    "∞",
+)
 BOOLEANS = ("true", "false")
 BEYOND = ("1e300", "-1e300", "1e-300", "1e308", "-1e-300", "5e-324")
 PERHAPS = ("1e30", "-1e30", "1e15", "1e-15", "-1", "0", "none", '"1e3"', "1_000.0", "0b1", "1e3", "-0.0")
@@ -31,19 +54,28 @@ TITLES = (
 )
 VERBS = ("compare", "compare", "compare", "run", "show", "stability", "ablate", "select", "table1")
 NO_EFFECT = (
-    ("line_bead", "numerics.MPM", "{grid_ratio = 2.0}", "mpm"), ("line_bead", "numerics.mmp", "{grid_ratio = 2.0}",
-    "mpm"),
-    ("line_bead", "numerics.SPH.cfl", "0.3", "sph"), ("line_bead", "numerics.pbdd.iterations", "4", "pbd"),
-    ("line_bead", "numerics.mpm.Grid_ratio", "2.0", "grid_ratio"), ("line_bead", "toolpath.center", "[0.0, 0.0]", ""),
-    ("line_bead", "toolpath.radius", "0.1", ""), ("line_bead", "toolpath.points", "[[0.0, 0.0], [0.01, 0.0]]", ""),
-    ("line_bead", "toolpath.dwell", "1.0", ""), ("ring_tower", "toolpath.start", "[0.0, 0.0]", ""),
-    ("ring_tower", "toolpath.end", "[0.1, 0.0]", ""), ("ring_tower", "toolpath.points", "[[0.0, 0.0], [0.01, 0.0]]",
-    ""),
-    ("ring_tower", "toolpath.dwell", "1.0", ""), ("wall", "toolpath.radius", "0.1", ""),
-    ("wall", "toolpath.center", "[0.0, 0.0]", ""), ("polyline", "toolpath.start", "[0.0, 0.0]", ""),
-    ("polyline", "toolpath.radius", "0.1", ""), ("dam_break", "bodies.0.radius", "0.01", ""),
-    ("dam_break", "bodies.0.height", "0.01", ""), ("bodies", "bodies.1.size", "[0.1, 0.1, 0.1]", ""),
-    ("bodies", "bodies.2.size", "[0.1, 0.1, 0.1]", ""), ("bodies", "bodies.2.height", "0.1", ""),
+    ("line_bead", "numerics.MPM", "{grid_ratio = 2.0}", "mpm"),
+    ("line_bead", "numerics.mmp", "{grid_ratio = 2.0}", "mpm"),
+    ("line_bead", "numerics.SPH.cfl", "0.3", "sph"),
+    ("line_bead", "numerics.pbdd.iterations", "4", "pbd"),
+    ("line_bead", "numerics.mpm.Grid_ratio", "2.0", "grid_ratio"),
+    ("line_bead", "toolpath.center", "[0.0, 0.0]", ""),
+    ("line_bead", "toolpath.radius", "0.1", ""),
+    ("line_bead", "toolpath.points", "[[0.0, 0.0], [0.01, 0.0]]", ""),
+    ("line_bead", "toolpath.dwell", "1.0", ""),
+    ("ring_tower", "toolpath.start", "[0.0, 0.0]", ""),
+    ("ring_tower", "toolpath.end", "[0.1, 0.0]", ""),
+    ("ring_tower", "toolpath.points", "[[0.0, 0.0], [0.01, 0.0]]", ""),
+    ("ring_tower", "toolpath.dwell", "1.0", ""),
+    ("wall", "toolpath.radius", "0.1", ""),
+    ("wall", "toolpath.center", "[0.0, 0.0]", ""),
+    ("polyline", "toolpath.start", "[0.0, 0.0]", ""),
+    ("polyline", "toolpath.radius", "0.1", ""),
+    ("dam_break", "bodies.0.radius", "0.01", ""),
+    ("dam_break", "bodies.0.height", "0.01", ""),
+    ("bodies", "bodies.1.size", "[0.1, 0.1, 0.1]", ""),
+    ("bodies", "bodies.2.size", "[0.1, 0.1, 0.1]", ""),
+    ("bodies", "bodies.2.height", "0.1", ""),
     ("ring_tower_drone", "collider.parts.1.size", "[0.1, 0.1, 0.1]", ""),
     ("ring_tower_drone", "collider.parts.0.radius", "0.1", ""),
     ("ring_tower_drone", "material.expansion.passes", "3", ""),
@@ -52,22 +84,40 @@ NO_EFFECT = (
     ("ring_tower_drone", "material.expansion.radius", "2.0", ""),
     ("ring_tower_drone", "material.expansion.noise", "0.5", ""),
     ("ring_tower_drone", "material.expansion.margin", "1.0", ""),
-    ("spawn", "material.expansion.time", "2.0", ""), ("spawn", "material.expansion.split", "false", ""),
-)  # fmt: skip
+    ("spawn", "material.expansion.time", "2.0", ""),
+    ("spawn", "material.expansion.split", "false", ""),
+)
 """(base, key, value, word of the nearest key that has an effect)."""
 CURES = {
     "jump": ("time", "rate", "stages", "rate_autocatalytic", "exponent"),
-    "stages": ("rate", "rate_autocatalytic", "exponent"), "linear": ("rate", "stages", "rate_autocatalytic",
-               "exponent"),
+    "stages": ("rate", "rate_autocatalytic", "exponent"),
+    "linear": ("rate", "stages", "rate_autocatalytic", "exponent"),
     "first_order": ("time", "stages", "rate_autocatalytic", "exponent"),
-    "kamal_sourour": ("time", "stages", "exponent"), "avrami": ("time", "stages", "rate_autocatalytic"),
-}  # fmt: skip
+    "kamal_sourour": ("time", "stages", "exponent"),
+    "avrami": ("time", "stages", "rate_autocatalytic"),
+}
 """Of each law of curing the keys that only others use."""
 NAMES = (
-    "../../climbed", "..", ".", "", "{base}/absolute", "../../../climbed", "a/b", "a/../b", "/", "./here", "a\nb",
+    "../../climbed",
+    "..",
+    ".",
+    "",
+    "{base}/absolute",
+    "../../../climbed",
+    "a/b",
+    "a/../b",
+    "/",
+    "./here",
+    "a\nb",
     "a\tb",
-    "\x00", "a\x1b[31mb", "\x7f", "x" * 300, "x" * 5000, "é" * 200, "runs/../../up",
-)  # fmt: skip
+    "\x00",
+    "a\x1b[31mb",
+    "\x7f",
+    "x" * 300,
+    "x" * 5000,
+    "é" * 200,
+    "runs/../../up",
+)
 ODD_NAMES = ("-x", " ", "a b", "名前", "CON", "a\\b", "~", "a.b", "$HOME", "a;b", "x" * 60, "{{name}}", "%s", "x" * 250)
 
 
@@ -143,8 +193,17 @@ def vectors(rng: random.Random) -> Iterator[Case]:
             text = f"[{', '.join([*good[:i], row, *good[i + 1 :]])}]"
             told = (leaf.key, leaf.path.split(".")[0]) if bad.startswith("1e") else (leaf.key,)  # see `magnitudes`
             yield ways("vectors", leaf, text, REFUSED, told, rng)
-        for text in ("[]", f"[{', '.join([*good, good[0]])}]", good[0] if not matrix else "1.0", '"text"', "{}", "nan",
-                     f"[[{', '.join(good)}]]", f"[{', '.join(['0.0'] * 100_000)}]", "true"):  # fmt: skip
+        for text in (
+            "[]",
+            f"[{', '.join([*good, good[0]])}]",
+            good[0] if not matrix else "1.0",
+            '"text"',
+            "{}",
+            "nan",
+            f"[[{', '.join(good)}]]",
+            f"[{', '.join(['0.0'] * 100_000)}]",
+            "true",
+        ):
             yield ways("vectors", leaf, text, REFUSED, (leaf.key,), rng)
 
 
@@ -198,11 +257,24 @@ def _of(kind: str) -> list[Leaf]:
 
 
 GENERATORS: tuple[tuple[Callable[[random.Random], Iterator[Case]], int, int], ...] = (
-    (numbers, 240, 18), (booleans, 80, 6), (magnitudes, 160, 12), (limits, 140, 10), (vectors, 150, 12),
-    (other_values, 60, 6), (no_effect, 200, 10), (names, 110, 10), (options.too_much, 80, 10), (options.lists, 90, 10),
-    (options.numbers, 160, 14), (options.verbs, 60, 6), (options.settings, 90, 8), (files.scenario_files, 200, 10),
-    (files.references, 50, 6), (files.extends, 50, 6), (options.legitimate, 400, 14),
-)  # fmt: skip
+    (numbers, 240, 18),
+    (booleans, 80, 6),
+    (magnitudes, 160, 12),
+    (limits, 140, 10),
+    (vectors, 150, 12),
+    (other_values, 60, 6),
+    (no_effect, 200, 10),
+    (names, 110, 10),
+    (options.too_much, 80, 10),
+    (options.lists, 90, 10),
+    (options.numbers, 160, 14),
+    (options.verbs, 60, 6),
+    (options.settings, 90, 8),
+    (files.scenario_files, 200, 10),
+    (files.references, 50, 6),
+    (files.extends, 50, 6),
+    (options.legitimate, 400, 14),
+)
 """(class, at most so many in the long fuzz, in the default suite)."""
 
 

@@ -10,40 +10,61 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from fluidbench.library import assign, load, validate
+from fluidbench.registry import get_method
 from fluidbench.scenario import Scenario
-from fluidbench.solver import get_solver
+from fluidbench.scenario.library import assign, load, validate
 
 NUMBER, VECTOR, CHOICE, FLAG, TEXT = "number", "vector", "choice", "flag", "text"
 PASTE = {"density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "yield_stress": 60.0, "bulk_modulus": 2e4}
 LINE = {
-    "domain": {"lower": [-0.03, -0.03, 0.0], "upper": [0.12, 0.03, 0.03]}, "material": PASTE, "duration": 0.5,
-    "spacing": 2e-3, "nozzle": {"diameter": 0.012, "flow_rate": 1.1e-5, "standoff": 0.01}, "tick": 1e-3,
-    "toolpath": {"kind": "polyline", "points": [[0.0, 0.0], [0.03, 0.0], [0.03, 0.01]], "speed": 0.1, "layers": 2,
-                 "layer_height": 0.008, "pause": 0.1},
-    "pool": 100_000, "output_interval": 0.1, "name": "polyline",
-}  # fmt: skip
+    "domain": {"lower": [-0.03, -0.03, 0.0], "upper": [0.12, 0.03, 0.03]},
+    "material": PASTE,
+    "duration": 0.5,
+    "spacing": 2e-3,
+    "nozzle": {"diameter": 0.012, "flow_rate": 1.1e-5, "standoff": 0.01},
+    "tick": 1e-3,
+    "toolpath": {
+        "kind": "polyline",
+        "points": [[0.0, 0.0], [0.03, 0.0], [0.03, 0.01]],
+        "speed": 0.1,
+        "layers": 2,
+        "layer_height": 0.008,
+        "pause": 0.1,
+    },
+    "pool": 100_000,
+    "output_interval": 0.1,
+    "name": "polyline",
+}
 STILL = {
     "domain": {"lower": [0.0, 0.0, 0.0], "upper": [0.3, 0.3, 0.3], "walls": {"z_lower": {"friction": 0.3}}},
-    "material": {"density": 1000.0, "youngs_modulus": 1e5, "viscosity": 1.0, "relaxation_time": 0.1}, "duration": 0.1,
-    "spacing": 0.01, "body_force_gradient": [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], "jitter": 0.1,
+    "material": {"density": 1000.0, "youngs_modulus": 1e5, "viscosity": 1.0, "relaxation_time": 0.1},
+    "duration": 0.1,
+    "spacing": 0.01,
+    "body_force_gradient": [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],
+    "jitter": 0.1,
     "name": "bodies",
     "bodies": [
-        {"kind": "box", "center": [0.1, 0.1, 0.1], "size": [0.1, 0.1, 0.1], "angular_velocity": [0.0, 0.0, 1.0],
-         "velocity_gradient": [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
-         "wave": {"amplitude": [0.1, 0.0, 0.0], "number": [0.0, 20.0, 0.0], "phase": 0.5}},
+        {
+            "kind": "box",
+            "center": [0.1, 0.1, 0.1],
+            "size": [0.1, 0.1, 0.1],
+            "angular_velocity": [0.0, 0.0, 1.0],
+            "velocity_gradient": [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
+            "wave": {"amplitude": [0.1, 0.0, 0.0], "number": [0.0, 20.0, 0.0], "phase": 0.5},
+        },
         {"kind": "cylinder", "center": [0.22, 0.22, 0.05], "radius": 0.03, "height": 0.1},
         {"kind": "sphere", "center": [0.22, 0.1, 0.22], "radius": 0.04, "velocity": [0.0, 0.0, -0.1]},
     ],
-}  # fmt: skip
+}
 SPAWN = LINE | {
     "name": "spawn",
     "toolpath": {"kind": "line", "start": [0.0, 0.0], "speed": 0.0, "dwell": 0.2},
-    "material": PASTE | {
+    "material": PASTE
+    | {
         "expansion": {"kind": "spawn", "ratio": 4.0, "delay": 0.1, "passes": 2, "interval": 0.1, "impulse": 0.1},
         "cure": {"kind": "kamal_sourour", "delay": 0.3, "rate": 2.0, "rate_autocatalytic": 3.0, "yield_stress": 2e3},
     },
-}  # fmt: skip
+}
 SHIPPED = ("line_bead", "ring_tower_drone", "foam_wall", "dam_break", "column_slump", "honey_line")
 OWN = {"polyline": LINE, "bodies": STILL, "spawn": SPAWN}
 
@@ -95,7 +116,7 @@ def leaves() -> tuple[Leaf, ...]:
         for leaf in _walk(Scenario, full(base), "", base, ()):
             found.setdefault(leaf.path, leaf)
     for method in ("mpm", "sph", "pbd"):
-        for name, info in get_solver(method).Config.model_fields.items():
+        for name, info in get_method(method).Config.model_fields.items():
             for leaf in _walk(info.annotation, None, f"numerics.{method}.{name}", "line_bead", info.metadata):
                 found.setdefault(leaf.path, leaf)
     return tuple(found.values())

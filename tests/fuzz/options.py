@@ -9,38 +9,117 @@ from .leaves import OWN, SHIPPED
 from .toml import dump
 
 BARE: dict[str, tuple[str, ...]] = {
-    "compare": ("compare", "line_bead"), "run": ("run", "line_bead"), "validate": ("validate", "free_fall"),
-    "stability": ("stability",), "ablate": ("ablate", "line_bead"), "select": ("select", "line_bead"),
-    "table1": ("table1", "--quick"), "table2": ("table2", "--quick"), "show": ("show", "line_bead"),
-    "render": ("render", "missing"), "list": ("list",), "doctor": ("doctor",),
-}  # fmt: skip
+    "compare": ("compare", "line_bead"),
+    "run": ("run", "line_bead"),
+    "validate": ("validate", "free_fall"),
+    "stability": ("stability",),
+    "ablate": ("ablate", "line_bead"),
+    "select": ("select", "line_bead"),
+    "table1": ("table1", "--quick"),
+    "table2": ("table2", "--quick"),
+    "show": ("show", "line_bead"),
+    "render": ("render", "missing"),
+    "list": ("list",),
+    "doctor": ("doctor",),
+}
 WITHOUT_OUT = ("show", "render", "list", "doctor")
 STUDIES = tuple(verb for verb in BARE if verb not in WITHOUT_OUT)
 HAS = {
-    "--solvers": ("compare", "validate", "stability", "ablate", "select", "table2"), "--axis": ("stability",),
-    "--levels": ("validate",), "--pools": ("table2",), "--backend": STUDIES, "--device": STUDIES, "--threads": STUDIES,
-    "--spacing": ("compare", "run", "stability", "ablate", "select", "table1", "show"), "--out": STUDIES,
-    "--wall-limit": tuple(v for v in STUDIES if v != "stability"), "--render-every": ("compare", "run"),
-    "--repeats": ("compare", "table1", "table2"), "--jobs": ("validate", "stability", "ablate", "table1"),
-    "--tolerance": ("ablate", "select"), "--budget": ("select",), "--colour": ("render",), "--solver": ("run",),
+    "--solvers": ("compare", "validate", "stability", "ablate", "select", "table2"),
+    "--axis": ("stability",),
+    "--levels": ("validate",),
+    "--pools": ("table2",),
+    "--backend": STUDIES,
+    "--device": STUDIES,
+    "--threads": STUDIES,
+    "--spacing": ("compare", "run", "stability", "ablate", "select", "table1", "show"),
+    "--out": STUDIES,
+    "--wall-limit": STUDIES,
+    "--render-every": ("compare", "run"),
+    "--repeats": ("compare", "table1", "table2"),
+    "--jobs": STUDIES,
+    "--executor": STUDIES,
+    "--tolerance": ("ablate", "select"),
+    "--budget": ("select",),
+    "--colour": ("render",),
+    "--solver": ("run",),
     "--checkpoint-every": ("compare", "run"),
     "--set": ("compare", "run", "stability", "ablate", "select", "table1", "show"),
-}  # fmt: skip
+}
 """Option with a value -> verbs; a test holds it against the application."""
 LISTS = {
-    "--solvers": (",", " , ", ",,,", "mpm,mpm", "mpm,sph,mpm", "mpn", "mpm;sph", "MPM", "mpm sph", "x" * 5000, "\x00",
-                  "mpm,\x1b[31m", "nan", "1e300"),
+    "--solvers": (
+        ",",
+        " , ",
+        ",,,",
+        "mpm,mpm",
+        "mpm,sph,mpm",
+        "mpn",
+        "mpm;sph",
+        "MPM",
+        "mpm sph",
+        "x" * 5000,
+        "\x00",
+        "mpm,\x1b[31m",
+        "nan",
+        "1e300",
+    ),
     "--axis": (",", " ,, ", "density,density", "viscocity", "density;spacing", "x" * 5000, "nan", "Density"),
     "--levels": (",", "", " ", "coarse,coarse", "corse", "coarse;fine", "1.5", "nan", "x" * 5000),
-    "--pools": (",", "", " ", "fit,fit", "298000,298000", "fit,298000,fit", "298k", "0", "-1", "1.5", "nan", "inf",
-                "1e5",
-                "true", "x" * 5000, "fitt", "9" * 5000, "²", "0x10"),
-    "--backend": (",", "", " ", "warp,warp", "wrap", "WARP", "taichi,taichi", "cuda", "x" * 5000, "warp;taichi",
-                  "\x00"),
+    "--pools": (
+        ",",
+        "",
+        " ",
+        "fit,fit",
+        "298000,298000",
+        "fit,298000,fit",
+        "298k",
+        "0",
+        "-1",
+        "1.5",
+        "nan",
+        "inf",
+        "1e5",
+        "true",
+        "x" * 5000,
+        "fitt",
+        "9" * 5000,
+        "²",
+        "0x10",
+    ),
+    "--backend": (
+        ",",
+        "",
+        " ",
+        "warp,warp",
+        "wrap",
+        "WARP",
+        "taichi,taichi",
+        "cuda",
+        "x" * 5000,
+        "warp;taichi",
+        "\x00",
+    ),
     "--device": ("", "gpu", "cuda:99", "cuda:-1", "cuda:nan", "cpu:1e300", "x" * 5000, "cpu,cpu", "\x1b[31m"),
     "--solver": (",", "mpm,mpm", "mpn", "x" * 5000, "MPM", " "),
     "--colour": ("layers", "", "x" * 5000, "nan"),
-}  # fmt: skip
+    "--executor": (
+        "there",
+        "Slurm",
+        " slurm",
+        "x" * 5000,
+        "nan",
+        ":",
+        ":a=1",
+        "local:nonsense",
+        "local:a",
+        "local:timeout_min=1,a",
+        "local:,,x",
+        "\x1b[31m",
+        "\x00",
+        "slurm,local",
+    ),
+}
 """Lists and names that are empty, repeated or misspelt."""
 REALS = (
     "nan",
@@ -61,23 +140,71 @@ REALS = (
 )
 WHOLES = ("0", "-1", "1.5", "nan", "inf", "1e300", "text", "", "true", "9" * 30, "9" * 5000, "-" + "9" * 30)
 VALUES = {
-    "--wall-limit": REALS, "--checkpoint-every": REALS, "--render-every": (*REALS, "0", "1e-12"),
+    "--wall-limit": REALS,
+    "--checkpoint-every": REALS,
+    "--render-every": (*REALS, "0", "1e-12"),
     "--spacing": (*REALS, "0", "1e-12"),
-    "--repeats": WHOLES, "--threads": WHOLES, "--jobs": WHOLES,
-    "--tolerance": ("5", "1.5", "nan", "inf", "-1", "0", "0%", "-5%", "nan%", "inf%", "much", "", "%", "5%%",
-                    "1e300", "1e300%",
-                    "1e-300", "1e-300%", "5,0%", "2"),
-    "--budget": ("nan", "inf", "-5", "-5s", "0", "0s", "soon", "s", "nans", "infs", "infm", "1e300h", "1e300",
-                 "1e-300s", "5d",
-                 "1e999", "5,5s", "h", "x" * 5000),
-}  # fmt: skip
+    "--repeats": WHOLES,
+    "--threads": WHOLES,
+    "--jobs": WHOLES,
+    "--tolerance": (
+        "5",
+        "1.5",
+        "nan",
+        "inf",
+        "-1",
+        "0",
+        "0%",
+        "-5%",
+        "nan%",
+        "inf%",
+        "much",
+        "",
+        "%",
+        "5%%",
+        "1e300",
+        "1e300%",
+        "1e-300",
+        "1e-300%",
+        "5,0%",
+        "2",
+    ),
+    "--budget": (
+        "nan",
+        "inf",
+        "-5",
+        "-5s",
+        "0",
+        "0s",
+        "soon",
+        "s",
+        "nans",
+        "infs",
+        "infm",
+        "1e300h",
+        "1e300",
+        "1e-300s",
+        "5d",
+        "1e999",
+        "5,5s",
+        "h",
+        "x" * 5000,
+    ),
+}
 """Numbers that are none, have no sense, or are beyond any physics."""
 MAY = {
-    "--wall-limit": ("0", "1_000", "１"), "--threads": ("1",), "--jobs": ("1_0",), "--tolerance": ("500%", "1", "٥%"),
-    "--budget": ("", "none", " 60s ", "٥s"), "--pools": ("٣٠٠٠٠٠", "5"), "--solvers": ("", "mpm,", ",mpm"),
+    "--wall-limit": ("0", "1_000", "１"),
+    "--threads": ("1",),
+    "--jobs": ("1_0",),
+    "--tolerance": ("500%", "1", "٥%"),
+    "--budget": ("", "none", " 60s ", "٥s"),
+    "--pools": ("٣٠٠٠٠٠", "5"),
+    "--solvers": ("", "mpm,", ",mpm"),
     "--axis": ("",),
-    "--solver": ("", "mpm,sph"), "--backend": ("warp,",), "--out": ("", ".", "a\x1b[31mb", "\udcff", "名前", "-x"),
-}  # fmt: skip
+    "--solver": ("", "mpm,sph"),
+    "--backend": ("warp,",),
+    "--out": ("", ".", "a\x1b[31mb", "\udcff", "名前", "-x"),
+}
 OUTS = ("/proc/nowhere", "/dev/null/x", "file", "file/below", "x" * 5000, "a\x00b", "/sys/x", "x/" * 3000)
 AMOUNT = r"(?i)\d[^\n]{0,40}(particle|step|tick|byte|[kmgtpezy]i?b\b|output|snapshot|picture|slot|run|core|thread)"
 
@@ -92,7 +219,7 @@ def command(verb: str, *rest: str) -> tuple[str, ...]:
 def lists(rng: random.Random) -> Iterator[Case]:
     for option, values in LISTS.items():
         for verb, value in itertools.product(HAS[option], values):
-            told = (option, "solver", "axis", "level", "backend", "device", "colour", "no run here")
+            told = (option, "solver", "axis", "level", "backend", "device", "colour", "no run here", "--executor")
             yield Case("lists and names of options", command(verb, f"{option}={value}"), names=told)
     for verb in HAS["--backend"]:
         if verb != "compare":
@@ -114,7 +241,8 @@ def numbers(rng: random.Random) -> Iterator[Case]:
         for verb, value in itertools.product(HAS[option], values):
             many = option == "--jobs" and value == "9" * 30  # no more of them start than there are runs
             expect = EITHER if many else REFUSED
-            yield Case(sort, command(verb, f"{option}={value}"), expect, names=(option, option.strip("-")))
+            told = (option, option.strip("-"), *(["runs at a time"] if option == "--jobs" else []))
+            yield Case(sort, command(verb, f"{option}={value}"), expect, names=told)
     for option, values in MAY.items():
         for verb, value in itertools.product(HAS[option], values):
             yield Case(sort, command(verb, f"{option}={value}"), EITHER)
@@ -151,21 +279,75 @@ def verbs(rng: random.Random) -> Iterator[Case]:
 def settings(rng: random.Random) -> Iterator[Case]:
     """What is no key=value, or a key that cannot be."""
     wrong = (
-        "nonsense", "=5", "", "=", " = 5", "a..b=1", ".=1", "material.=1", "..=1", "material.density.x=1",
+        "nonsense",
+        "=5",
+        "",
+        "=",
+        " = 5",
+        "a..b=1",
+        ".=1",
+        "material.=1",
+        "..=1",
+        "material.density.x=1",
         "domain.lower.7=0",
-        "domain.lower.-1=0", "domain.lower.²=1", "domain.lower.1e3=0", "domain.lower.x=1", "domain.lower=none",
-        "bodies.0.center=[0, 0, 0]", "title.x=1", "material=5", "material=none", "domain=none", "duration=none",
-        "toolpath=none", "spacing=none", "a.b.c.d.e=1", ".".join(["a"] * 5000) + "=1", "x" * 20_000 + "=1",
-        "material.densty=1", "Material.density=1", "material.Density=1", "material .density=1", "material.density =nan",
-        "domain.walls.q_lower=slip", "domain.walls.z_lower=slippery", "domain.walls.z_lower={friction = -1}", "\x00=1",
-        "\x1b[31m=1", "名前=1", "material[density]=1", "material/density=1", "--set=1", "quick.duration=1", "extends=5",
-        "gravity=" + "[" * 3000, "gravity=" + "[" * 900 + "]" * 900, "material={}", "material={density = nan}",
-        "domain.walls=5", "nozzle={}", "toolpath.points=[[]]", "seed=" + "9" * 5000, "pool=0.5", "layers=3",
+        "domain.lower.-1=0",
+        "domain.lower.²=1",
+        "domain.lower.1e3=0",
+        "domain.lower.x=1",
+        "domain.lower=none",
+        "bodies.0.center=[0, 0, 0]",
+        "title.x=1",
+        "material=5",
+        "material=none",
+        "domain=none",
+        "duration=none",
+        "toolpath=none",
+        "spacing=none",
+        "a.b.c.d.e=1",
+        ".".join(["a"] * 5000) + "=1",
+        "x" * 20_000 + "=1",
+        "material.densty=1",
+        "Material.density=1",
+        "material.Density=1",
+        "material .density=1",
+        "material.density =nan",
+        "domain.walls.q_lower=slip",
+        "domain.walls.z_lower=slippery",
+        "domain.walls.z_lower={friction = -1}",
+        "\x00=1",
+        "\x1b[31m=1",
+        "名前=1",
+        "material[density]=1",
+        "material/density=1",
+        "--set=1",
+        "quick.duration=1",
+        "extends=5",
+        "gravity=" + "[" * 3000,
+        "gravity=" + "[" * 900 + "]" * 900,
+        "material={}",
+        "material={density = nan}",
+        "domain.walls=5",
+        "nozzle={}",
+        "toolpath.points=[[]]",
+        "seed=" + "9" * 5000,
+        "pool=0.5",
+        "layers=3",
         "numerics=5",
-        "numerics.mpm=5", "numerics.mpm.grid_ratio={}", "numerics.mpm.=1", "numerics=none\n", "domain.lower.0=none",
-        "material.density=1\nviscosity=2\n[" , "toolpath.layers=1e18", "toolpath.layers=100000", "reference=nothing",
-        "domain.lower.00000=nan", "domain.lower.٠=nan", "collider={parts = []}", "bodies=[]\x00", "bodies=[1]",
-    )  # fmt: skip
+        "numerics.mpm=5",
+        "numerics.mpm.grid_ratio={}",
+        "numerics.mpm.=1",
+        "numerics=none\n",
+        "domain.lower.0=none",
+        "material.density=1\nviscosity=2\n[",
+        "toolpath.layers=1e18",
+        "toolpath.layers=100000",
+        "reference=nothing",
+        "domain.lower.00000=nan",
+        "domain.lower.٠=nan",
+        "collider={parts = []}",
+        "bodies=[]\x00",
+        "bodies=[1]",
+    )
     lenient = {"numerics=none\n", "domain.lower=none", "material.density=1\nviscosity=2\n["}
     for text, verb in itertools.product(wrong, ("compare", "show")):
         key = text.partition("=")[0].strip()
@@ -205,7 +387,8 @@ def too_much(rng: random.Random) -> Iterator[Case]:
         for option in ("--repeats", "--jobs"):
             for verb in HAS[option]:
                 expect = EITHER if option == "--jobs" else REFUSED
-                yield Case(sort, command(verb, option, str(value)), expect, names=(option, option.strip("-")))
+                told = (option, option.strip("-"), *(["runs at a time"] if option == "--jobs" else []))
+                yield Case(sort, command(verb, option, str(value)), expect, names=told)
         for verb in HAS["--threads"]:
             yield Case(sort, command(verb, "--backend", "taichi", "--threads", str(value)), names=("thread",))
     for value in ("1e-12", "1e-10"):
@@ -225,19 +408,40 @@ def legitimate(rng: random.Random) -> Iterator[Case]:
     ):
         right += [("show", name), ("compare", name), ("run", name), ("run", name, "--quick"), ("select", name)]
     sets = (
-        "material.viscosity=1e3", "spacing=1e-3", "material.density=1e4", "material.density=10",
+        "material.viscosity=1e3",
+        "spacing=1e-3",
+        "material.density=1e4",
+        "material.density=10",
         "material.youngs_modulus=1e9",
-        "material.poisson_ratio=0.499", "material.poisson_ratio=-0.5", "material.yield_stress=0", "gravity=[0, 0, 0]",
-        "gravity=[0.0, 0.0, -1.62]", "duration=10", "toolpath.speed=0.01", "nozzle.exit_speed=1",
+        "material.poisson_ratio=0.499",
+        "material.poisson_ratio=-0.5",
+        "material.yield_stress=0",
+        "gravity=[0, 0, 0]",
+        "gravity=[0.0, 0.0, -1.62]",
+        "duration=10",
+        "toolpath.speed=0.01",
+        "nozzle.exit_speed=1",
         "output_interval=none",
-        'title="Überschrift, 名前"', "name=my_line-1", "seed=4294967295", "domain.walls.z_lower={friction = 0.3}",
-        "numerics.mpm.grid_ratio=1", "numerics.sph.cfl=0.2", "material.flow_index=0.5", "toolpath.layers=1",
+        'title="Überschrift, 名前"',
+        "name=my_line-1",
+        "seed=4294967295",
+        "domain.walls.z_lower={friction = 0.3}",
+        "numerics.mpm.grid_ratio=1",
+        "numerics.sph.cfl=0.2",
+        "material.flow_index=0.5",
+        "toolpath.layers=1",
         "tick=1e-4",
-        "domain.upper=[1.2, 0.3, 0.3]", "material.sound_speed=10", "body_force=[0.1, 0, 0]", "pool=50000",
+        "domain.upper=[1.2, 0.3, 0.3]",
+        "material.sound_speed=10",
+        "body_force=[0.1, 0, 0]",
+        "pool=50000",
         "output_interval=5",
-        "domain.lower.0=-0.05", "material.plastic_viscosity=0", "numerics.mpm={}", "spacing=3e-3",
+        "domain.lower.0=-0.05",
+        "material.plastic_viscosity=0",
+        "numerics.mpm={}",
+        "spacing=3e-3",
         "material.density=1000",
-    )  # fmt: skip
+    )
     right += [(verb, "line_bead", "--set", text) for text in sets for verb in ("compare", "run", "show")]
     right += [command("run", "--wall-limit", v) for v in ("5", "0.5", "1e5")]
     right += [command("ablate", "--tolerance", v) for v in ("5%", "5 %", "0.05", "0.9", "100%", "0.1%", " 5% ")]

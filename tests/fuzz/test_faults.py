@@ -212,23 +212,22 @@ def test_files_follow_the_umask(umask, tmp_path):
 
 
 @pytest.mark.parametrize("junk", [b"", b"[]", b"5", b"{", b"\xff\x00", None], ids=repr)
-def test_a_broken_result_of_an_experiment_is_measured_again(junk, tmp_path, monkeypatch):
+def test_a_broken_result_of_an_experiment_is_measured_again(junk, tmp_path):
     """`stability` keeps its points in result.json."""
-    from fluidbench.store import Store
-    from fluidbench.study import experiments
+    from fluidbench.runs.execute import Hooks, execute
+    from fluidbench.runs.experiment import Experiment
+    from fluidbench.runs.store import Store
 
-    def one_by_one(tasks, function, workers):
-        return [(i, function(task)) for i, task in tasks.items()]
-
-    monkeypatch.setattr(experiments, "_round", one_by_one)  # no processes
-    store, tasks = Store(tmp_path), [("point", {"x": 2, "method": "mpm", "target": {"backend": "warp"}})]
-    double = lambda task: {"twice": 2 * task["x"]}  # noqa: E731
-    assert experiments.run_tasks(tasks, double, store, 1, lambda *_: None) == [{"twice": 4}]
+    notes: list[str] = []
+    hooks = Hooks(*[lambda *_: None] * 3, notes.append)
+    work, before = Experiment("copy:copy", "point", "mpm", {"x": 2}), Child.started
+    assert execute([work], Store(tmp_path), hooks) == [{"x": 2}] and Child.started == before + 1
     path = next(tmp_path.rglob("result.json"))
     path.unlink()
     path.mkdir() if junk is None else path.write_bytes(junk)
-    assert experiments.run_tasks(tasks, double, store, 1, lambda *_: None) == [{"twice": 4}]
-    assert next(tmp_path.rglob("result.json")).is_file()
+    assert execute([work], Store(tmp_path), hooks) == [{"x": 2}] and Child.started == before + 2
+    assert next(tmp_path.rglob("result.json")).is_file() and len(notes) == 1 and "result.json" in notes[0]
+    assert execute([work], Store(tmp_path), hooks) == [{"x": 2}] and Child.started == before + 2
 
 
 def test_only_the_broken_run_is_made_again(tmp_path):

@@ -10,12 +10,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fluidbench.cli.app import budget_of, count_of, fraction, names_in, targets_of
+from fluidbench.cli.options import budget_of, count_of, fraction, names_in
 from fluidbench.errors import UserError
-from fluidbench.library import assign, load, parse_override, validate
+from fluidbench.registry import method_names
 from fluidbench.scenario import Scenario
+from fluidbench.scenario.library import assign, load, parse_override, validate
 from fluidbench.study.case import select
 from fluidbench.study.stability import choose
+from fluidbench.study.workplace import targets_of
 
 from .harness import fluidbench, nothing_runs
 from .leaves import OWN, full, leaves, table
@@ -23,23 +25,33 @@ from .toml import dump
 
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")  # the program does not make errors of them
 CALM = settings(
-    max_examples=60, deadline=None, derandomize=True,
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)  # fmt: skip
+)
 MANY = settings(CALM, max_examples=300)  # where an example takes a millisecond
 KEYS = sorted({leaf.path for leaf in leaves()})
 HOSTILE = st.one_of(
-    st.floats(), st.integers(), st.booleans(), st.text(max_size=40), st.just([]), st.just({}), st.none(),
+    st.floats(),
+    st.integers(),
+    st.booleans(),
+    st.text(max_size=40),
+    st.just([]),
+    st.just({}),
+    st.none(),
     st.sampled_from([math.nan, math.inf, -math.inf, 1e300, 1e-300, -1e300, 1e30, 0, -1, 10**400, date(1979, 5, 27)]),
-)  # fmt: skip
+)
 JUNK = st.recursive(HOSTILE, lambda s: st.lists(s, max_size=4) | st.dictionaries(st.text(max_size=9), s, max_size=4))
 WORDS = st.one_of(
-    st.text(max_size=30), st.sampled_from(["mpm", "warp", "fit", "nan", "inf", "5", "5%", "60s", ",", "coarse",
-    "density"]),
-    st.lists(st.sampled_from(["mpm", "fit", "warp", "density", "", " ", "nan", "-1", "1e300"]),
-    max_size=4).map(",".join),
-    st.floats().map(str), st.integers().map(str),
-)  # fmt: skip
+    st.text(max_size=30),
+    st.sampled_from(["mpm", "warp", "fit", "nan", "inf", "5", "5%", "60s", ",", "coarse", "density"]),
+    st.lists(st.sampled_from(["mpm", "fit", "warp", "density", "", " ", "nan", "-1", "1e300"]), max_size=4).map(
+        ",".join
+    ),
+    st.floats().map(str),
+    st.integers().map(str),
+)
 
 
 def sound(scenario: Scenario) -> None:
@@ -128,8 +140,14 @@ def test_any_text_of_set_is_an_override_or_a_user_error(text):
 @MANY
 @given(WORDS)
 def test_any_text_of_an_option_is_a_value_or_a_user_error(text):
-    for read in (fraction, budget_of, lambda t: count_of(t, "--pools"), lambda t: choose(names_in(t, "--axis", "axis")),
-                 lambda t: select(names_in(t, "CASES", "case")), lambda t: targets_of("cpu", t, 1)):  # fmt: skip
+    for read in (
+        fraction,
+        budget_of,
+        lambda t: count_of(t, "--pools"),
+        lambda t: choose(names_in(t, "--axis", "axis"), method_names()),
+        lambda t: select(names_in(t, "CASES", "case")),
+        lambda t: targets_of("cpu", names_in(t, "--backend", "backend"), 1),
+    ):
         try:
             made = read(text)
         except UserError as error:
@@ -142,13 +160,24 @@ def test_any_text_of_an_option_is_a_value_or_a_user_error(text):
 
 
 OPTIONS = {
-    "compare": ("--solvers", "--backend", "--wall-limit", "--render-every", "--repeats", "--spacing", "--set",
-                "--device"),
-    "run": ("--solver", "--wall-limit", "--render-every", "--threads"), "validate": ("--levels", "--jobs",
-            "--wall-limit"),
-    "stability": ("--axis", "--jobs", "--solvers"), "select": ("--tolerance", "--budget"), "ablate": ("--tolerance",),
-    "table2": ("--pools", "--repeats"), "show": ("--set", "--spacing"),
-}  # fmt: skip
+    "compare": (
+        "--solvers",
+        "--backend",
+        "--wall-limit",
+        "--render-every",
+        "--repeats",
+        "--spacing",
+        "--set",
+        "--device",
+    ),
+    "run": ("--solver", "--wall-limit", "--render-every", "--threads"),
+    "validate": ("--levels", "--jobs", "--wall-limit"),
+    "stability": ("--axis", "--jobs", "--solvers"),
+    "select": ("--tolerance", "--budget"),
+    "ablate": ("--tolerance",),
+    "table2": ("--pools", "--repeats"),
+    "show": ("--set", "--spacing"),
+}
 NEEDS = {"validate": "free_fall", "stability": "line_bead", "table2": ""}
 
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from fluidbench.particles import CARRIED, CLAMPED, FREE
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.method.target import BACKENDS, Target
+from fluidbench.native.simulation import Simulation
 from fluidbench.scenario import Scenario
-from fluidbench.simulation import Simulation
-from fluidbench.target import BACKENDS, Target
 from solvers.pbd.bonds import DAMPED
 from solvers.pbd.laws import conveyed_modulus
 
@@ -31,8 +31,10 @@ def arrays_of(sim: Simulation) -> dict[str, wp.array]:
     owners = {"": sim.solver, "neighbours.": getattr(sim.solver, "neighbours", None)}
     network = getattr(sim.solver, "network", None)
     if network is not None:
-        found |= {f"bonds.{name}": getattr(network.bonds, name) for name in ("number", "partner", "rest", "multiplier",
-                                                                            "state")}  # fmt: skip
+        found |= {
+            f"bonds.{name}": getattr(network.bonds, name)
+            for name in ("number", "partner", "rest", "multiplier", "state")
+        }
     for prefix, owner in owners.items():
         for name, value in vars(owner).items() if owner is not None else ():
             if isinstance(value, wp.array):
@@ -52,7 +54,7 @@ class Twins:
         for sim in (self.warp, self.taichi):
             sim.prepare()
         for _ in range(ticks):
-            self.warp.advance()
+            self.warp.advance_tick()
         self.taichi.pool.counts = list(self.warp.pool.counts)
         self.taichi.solver.started = True  # MPM gathers the affine field of its first state once
         self.ours, self.theirs = arrays_of(self.warp), arrays_of(self.taichi)
@@ -71,9 +73,7 @@ class Twins:
             return {}
         masses = sim.pool.mass.numpy()
         step = DAMPED * sim.scene.spacing / 2.0  # that a bond between equals takes when it is off by a spacing
-        least = {
-            "multiplier": 1.0, "stretch.correction": step, "bonds.multiplier": step * masses[masses > 0].min()
-        }  # fmt: skip
+        least = {"multiplier": 1.0, "stretch.correction": step, "bonds.multiplier": step * masses[masses > 0].min()}
         if not sim.scene.flowing:
             return least
         modulus, density = (float(sim.scene.phases.numpy()[key].max()) for key in ("shear_modulus", "density"))

@@ -74,9 +74,12 @@ def test_rotation_makes_no_stress():
 
 
 @given(
-    trial=st.floats(1e-2, 1e5), threshold=st.floats(0, 1e4), consistency=st.floats(1e-3, 1e4),
-    index=st.sampled_from([0.3, 0.5, 1.0, 1.7]), stiffness=st.floats(1e-2, 1e4),
-)  # fmt: skip
+    trial=st.floats(1e-2, 1e5),
+    threshold=st.floats(0, 1e4),
+    consistency=st.floats(1e-3, 1e4),
+    index=st.sampled_from([0.3, 0.5, 1.0, 1.7]),
+    stiffness=st.floats(1e-2, 1e4),
+)
 def test_flow_stress_solves_its_equation(trial, threshold, consistency, index, stiffness):
     """tau = threshold + k r^n with r = (trial - tau) / S, never above the trial nor below the threshold."""
     tau = law.flow_stress(trial, threshold, consistency, index, stiffness)

@@ -3,13 +3,17 @@
 import pytest
 from pydantic import ValidationError
 
-from fluidbench.library import load
 from fluidbench.scenario import Scenario
+from fluidbench.scenario.library import load
 
 CHANGES = [
-    {"duration": 3.0}, {"spacing": 3e-3}, {"tick": 1e-3}, {"output_interval": 0.05}, {"gravity": (0.0, 0.0, -1.6)},
+    {"duration": 3.0},
+    {"spacing": 3e-3},
+    {"tick": 1e-3},
+    {"output_interval": 0.05},
+    {"gravity": (0.0, 0.0, -1.6)},
     {"body_force": (3.0, 0.0, 0.0)},
-]  # fmt: skip
+]
 DERIVED = ("schedule", "reference_speed", "peak_acceleration", "aged", "liquid_sound_speed", "wave_speed")
 
 

@@ -2,49 +2,47 @@
 
 import json
 import math
-from pathlib import Path
 
 import pytest
 
-from fluidbench import provenance
-from fluidbench.library import load
-from fluidbench.report.select import _further
-from fluidbench.run import Job
-from fluidbench.store import Store, read_record, write_record
-from fluidbench.study import execute as execution
-import fluidbench.job as job_module
+from fluidbench.method.verdict import Evidence as Weight
+from fluidbench.method.verdict import Verdict, evidence_of, lacking
+from fluidbench.paper.cells import figures
+from fluidbench.paper.evidence import METHODS, Evidence
+from fluidbench.paper.table1 import cells, claims, fidelity
+from fluidbench.paper.table2 import Row
+from fluidbench.paper.table2 import claims as claims2
+from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED, at_equal_error, share_within, told, winners
+from fluidbench.runs import execute as execution
+from fluidbench.runs import job as job_module
+from fluidbench.runs import provenance
+from fluidbench.runs.execute import Hooks, execute
+from fluidbench.runs.job import Job
+from fluidbench.runs.record import Record, keep
+from fluidbench.runs.store import Store, read_record, write_record
+from fluidbench.scenario.library import load
 from fluidbench.study import select as selection
 from fluidbench.study.case import Finding, cases
-from fluidbench.study.cells import figures
-from fluidbench.study.evidence import METHODS, Evidence
-from fluidbench.study.execute import Finished, Hooks, execute
 from fluidbench.study.select import Candidate, Selection, Trust, _unconverged, assess, confidence
-from fluidbench.study.table1 import claims, fidelity, table1
-from fluidbench.study.table2 import Row
-from fluidbench.study.table2 import claims as claims2
+from fluidbench.study.select_report import _further
 from fluidbench.study.validate import Trial
-from fluidbench.study.verdicts import CONFIRMED, OPEN, REFUTED, at_equal_error, share_within, told, winners
-from fluidbench.verdict import Evidence as Weight
-from fluidbench.verdict import Verdict, evidence_of, lacking
+
+from .made import finished
 
 SAYS = {
-    "completed": Weight.RESULT, "diverged": Weight.INSTABILITY, "error": Weight.NOTHING, "timeout": Weight.NOTHING,
-    "out_of_capacity": Weight.NOTHING, "refused": Weight.NOTHING,
-}  # fmt: skip
+    "completed": Weight.RESULT,
+    "diverged": Weight.INSTABILITY,
+    "error": Weight.NOTHING,
+    "timeout": Weight.NOTHING,
+    "out_of_capacity": Weight.NOTHING,
+    "refused": Weight.NOTHING,
+}
 
 
 def test_every_verdict_is_evidence_of_one_thing():
     assert {str(v): evidence_of(v) for v in Verdict} == SAYS
     with pytest.raises(ValueError, match="sound"):
         evidence_of("sound")
-
-
-def finished(method="mpm", verdict="completed", reason="", repeat=0, spacing=1e-3, **cost):
-    cost = {"wall_per_simulated_s": 1.0, "wall_s": 1.0, "mean_dt_s": 1e-4, "bytes_per_particle": 900.0,
-            "steps_per_s": 10.0, "simulated_to_real": 0.1, "cpu_s": 1.0} | cost  # fmt: skip
-    record = {"scenario": "line_bead", "method": method, "device": "cpu", "backend": "warp", "repeat": repeat,
-              "verdict": verdict, "reason": reason, "spacing_m": spacing, "measures": {}}  # fmt: skip
-    return Finished(record | ({"cost": cost} if verdict == "completed" else {}), Path("nowhere"), False)
 
 
 def trial(case, method, verdict="pass", error=0.0, wall=1.0, spacing=1.0):
@@ -64,14 +62,16 @@ def test_what_says_nothing_is_not_judged_and_what_blew_up_is_not_within():
 
 def test_no_verdict_rests_on_runs_that_crashed():
     """104 runs that all ended in error were once 8 confirmed and 5 refuted."""
-    broken = {m: [finished(m, "error", "ImportError", r) for r in range(3)] for m in METHODS}
+    broken = {m: [finished(m, "error", reason="ImportError", repeat=r) for r in range(3)] for m in METHODS}
     trials = [trial(name, m, "error") for name in cases() if cases()[name].drive is None for m in METHODS]
     for t in trials:
-        t.runs = {"a": finished(t.method, "error", "ImportError")}
-    points = {m: [{"axis": "spacing", "value": 1.0, "method": m, "verdict": "error", "reason": "it died"}] * 2
-              for m in METHODS}  # fmt: skip
+        t.runs = {"a": finished(t.method, "error", reason="ImportError")}
+    points = {
+        m: [{"axis": "spacing", "value": 1.0, "method": m, "verdict": "error", "reason": "it died"}] * 2
+        for m in METHODS
+    }
     e = Evidence(load("line_bead"), trials, broken, {m: broken[m][0] for m in METHODS}, limits=points, other=broken)
-    assert {cell.verdict for cell in table1(e)} == {OPEN}
+    assert {cell.verdict for cell in cells(e)} == {OPEN}
     missing = e.missing()
     assert any("ImportError" in line for line in missing) and any("it died" in line for line in missing)
 
@@ -96,8 +96,9 @@ def test_a_prediction_needs_answers_not_crashes():
     runs = {m: [finished(m, repeat=r) for r in range(2)] for m in METHODS}
 
     def verdict(state):
-        e = Evidence(load("line_bead"), [trial(n, "pbd", state, 9.9) for n in names], runs,
-                     {m: runs[m][0] for m in METHODS})  # fmt: skip
+        e = Evidence(
+            load("line_bead"), [trial(n, "pbd", state, 9.9) for n in names], runs, {m: runs[m][0] for m in METHODS}
+        )
         (cell,) = [c for c in claims(e) if c.paper == "cannot predict deformation under load"]
         return cell.verdict
 
@@ -140,8 +141,8 @@ def test_claims_of_table_2_need_every_repeat():
 
 
 def test_what_is_lacking_is_named_once_with_its_reason():
-    runs = [finished(), finished("sph", "timeout", "too slow"), finished("sph", "timeout", "too slow", 1),
-            finished("pbd", "refused", "no")]  # fmt: skip
+    slow = [finished("sph", "timeout", reason="too slow", repeat=r) for r in range(2)]
+    runs = [finished(), *slow, finished("pbd", "refused", reason="no")]
     assert lacking(runs) == ["line_bead, sph, d = 1 mm: timeout: too slow", "line_bead, pbd, d = 1 mm: refused: no"]
     assert lacking(runs, refusals=False) == ["line_bead, sph, d = 1 mm: timeout: too slow"]
 
@@ -154,15 +155,17 @@ def stored(tmp_path, monkeypatch):
     """A store, a job, and how often it was really run, with a child that does nothing."""
     made = []
 
-    def launch(job, folder, progress=None):
+    def launch(job, folder, progress=None, gpu=""):
         made.append(job)
         (folder / "final.npz").write_bytes(b"particles")
         frames = [folder / "frame_0000.npz"] if job.keep_frames else []
         for path in frames:
             path.write_bytes(b"frame")
-        table = {"verdict": "completed", "reason": "", "measures": {"top_m": 1.0}, "film_every": job.film_every,
-                 "machine": execution.hardware(job.target) | {"time": "now"}}  # fmt: skip
-        return write_record(folder, job.heading() | table, [folder / "final.npz", *frames])
+        about = job_module.hardware(job.target) | {"time": "now"}
+        record = Record(
+            **job.heading(), verdict="completed", measures={"top_m": 1.0}, film_every=job.film_every, machine=about
+        )
+        return keep(folder, record, ["final.npz", *(path.name for path in frames)])
 
     monkeypatch.setattr(execution, "launch", launch)
     notes: list[str] = []
@@ -185,7 +188,7 @@ def test_a_stored_run_is_reused_only_whole(stored):
     (path,) = root.glob("runs/*/record.json")
     path.write_text(path.read_text().replace('"top_m": 1.0', '"top_m": 2.0'))
     result, runs = call()
-    assert runs == 1 and not result.reused and result.record["measures"]["top_m"] == 1.0
+    assert runs == 1 and not result.reused and result.record.measures["top_m"] == 1.0
     assert "record.json is not as it was written" in notes[-1]
     (root / path.parent / "final.npz").unlink()
     assert call()[1] == 1 and "final.npz is missing" in notes[-1]
@@ -198,9 +201,10 @@ def test_a_stored_run_is_of_this_code_and_this_machine(stored, monkeypatch):
     _, call, notes = stored
     call()
     for place, name, change, words in (
-        (job_module, "code", {"sources": "edited"}, "the code"), (job_module, "code", {"warp": "9.9"}, "the code"),
-        (execution, "hardware", {"processor": "another"}, "another machine"),
-    ):  # fmt: skip
+        (job_module, "code", {"sources": "edited"}, "the code"),
+        (job_module, "code", {"warp": "9.9"}, "the code"),
+        (job_module, "hardware", {"processor": "another"}, "another machine"),
+    ):
         real = getattr(provenance, name)
         monkeypatch.setattr(place, name, lambda *a, real=real, change=change: real(*a) | change)
         assert call()[1] == 1 and words in notes[-1]
@@ -259,24 +263,21 @@ def test_the_code_of_a_run_is_the_hash_of_its_sources(tmp_path, monkeypatch):
             self.submodule_search_locations = [str(tmp_path / name)]
 
     monkeypatch.setattr(provenance, "find_spec", Spec)
-    first = provenance._hash_of(("fluidbench", "solvers"))
+    first = provenance._hash_of(("fluidbench", "solvers"), provenance.IDLE)
     (tmp_path / "fluidbench" / "report" / "page.py").write_text("no run enters this\n")
-    assert provenance._hash_of(("fluidbench", "solvers")) == first
+    assert provenance._hash_of(("fluidbench", "solvers"), provenance.IDLE) == first
     (tmp_path / "solvers" / "kernel.py").write_text("b = 2\n")
-    second = provenance._hash_of(("fluidbench", "solvers"))
+    second = provenance._hash_of(("fluidbench", "solvers"), provenance.IDLE)
     (tmp_path / "solvers" / "kernel.py").write_text("b = 3\n")
-    assert len({first, second, provenance._hash_of(("fluidbench", "solvers"))}) == 3
+    assert len({first, second, provenance._hash_of(("fluidbench", "solvers"), provenance.IDLE)}) == 3
 
 
 # --- selection
 
 
 def record(method, spacing, width):
-    cost = {"mean_dt_s": 1e-4, "wall_s": spacing**-4, "wall_per_simulated_s": spacing**-4}
-    return Finished(
-        {"verdict": "completed", "method": method, "device": "cpu", "backend": "warp", "spacing_m": spacing,
-         "measures": {"bead_width_m": width}, "answers": [], "cost": cost}, Path("nowhere"), False,
-    )  # fmt: skip
+    wall = spacing**-4
+    return finished(method, spacing=spacing, measures={"bead_width_m": width}, wall_s=wall, wall_per_simulated_s=wall)
 
 
 def tried(method, errors):
@@ -305,7 +306,7 @@ def test_confidence_needs_a_second_witness_that_converges(monkeypatch):
         return [record(method, d, limit * (1 + slope * d)) for d in (1.0, 1.5, 2.0)]
 
     def sure(*groups, tolerance=0.05):
-        methods = [g[0].record["method"] for g in groups]
+        methods = [g[0].method for g in groups]
         return confidence(assess(load("line_bead"), methods, [r for g in groups for r in g]), tolerance)
 
     assert sure(runs("mpm", 0.010), runs("sph", 0.0102)).startswith("high")

@@ -5,13 +5,23 @@ import math
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.report import ablate as page
 from fluidbench.study import ablate as module
-from fluidbench.study.ablate import Ablation, Change, Effect, ablate, changes, command, economies, effect, features
-from fluidbench.target import Target
+from fluidbench.study import ablate_report as page
+from fluidbench.study.ablate import (
+    Ablation,
+    Change,
+    Effect,
+    ablate,
+    ablation,
+    changes,
+    command,
+    economies,
+    effect,
+    features,
+)
 
 from ..conftest import scenario
-from .made import BEAD, finished
+from .made import BEAD, change, finished, working, workplace_in
 
 PASTE = {"density": 1.0, "youngs_modulus": 100.0, "yield_stress": 1.0, "plastic_viscosity": 0.5}
 CURE = {"youngs_modulus": 200.0, "delay": 1.0}
@@ -26,14 +36,17 @@ def test_features_of_a_paste_can_be_left_out():
     found = settings(features(scenario(material={**PASTE, "viscosity": 0.25})))
     assert found == {
         "no elasticity, no yield: a Newtonian liquid": {
-            "material.youngs_modulus": None, "material.yield_stress": None, "material.plastic_viscosity": None,
-            "material.relaxation_time": None, "material.viscosity": 0.5,
+            "material.youngs_modulus": None,
+            "material.yield_stress": None,
+            "material.plastic_viscosity": None,
+            "material.relaxation_time": None,
+            "material.viscosity": 0.5,
         },
         "no yield stress": {"material.yield_stress": 0.0},
         "no plastic viscosity": {"material.plastic_viscosity": 0.0},
         "no viscosity": {"material.viscosity": 0.0},
         "slip floor": {"domain.walls.z_lower": "slip"},
-    }  # fmt: skip
+    }
     thick = settings(features(scenario(material={**PASTE, "viscosity": 0.75})))
     assert thick["no elasticity, no yield: a Newtonian liquid"]["material.viscosity"] == 0.75
 
@@ -72,10 +85,17 @@ def test_economies_of_every_method():
 
 
 def test_economies_follow_the_settings_and_the_material():
-    numerics = {"mpm": {"grid_ratio": 3.5}, "sph": {"smoothing_ratio": 2.0, "cfl": 0.3},
-                "pbd": {"iterations": 1, "advance": 0.75}}  # fmt: skip
-    found = {(c.name, c.method): c.settings for c in economies(
-        scenario(material={"density": 1.0, "viscosity": 0.1}, numerics=numerics), ["mpm", "sph", "pbd"])}  # fmt: skip
+    numerics = {
+        "mpm": {"grid_ratio": 3.5},
+        "sph": {"smoothing_ratio": 2.0, "cfl": 0.3},
+        "pbd": {"iterations": 1, "advance": 0.75},
+    }
+    found = {
+        (c.name, c.method): c.settings
+        for c in economies(
+            scenario(material={"density": 1.0, "viscosity": 0.1}, numerics=numerics), ["mpm", "sph", "pbd"]
+        )
+    }
     assert found["slower sound", None] == {"sound_speed_ratio": 5.0}
     assert found["coarser grid", "mpm"] == {"numerics.mpm.grid_ratio": 4.0}
     assert found["fewer neighbours", "sph"] == {"numerics.sph.smoothing_ratio": 1.6}
@@ -95,7 +115,7 @@ def test_an_effect_is_the_largest_shift_and_the_share_of_time():
     run = finished(measures={"bead_width_m": 0.009, "height_m": 0.006, "slump": 3.0}, cpu_s=6.0, wall_s=1.9)
     seen = effect(Change("x", {}), "mpm", run, base)
     assert (seen.length, seen.moved, seen.saved) == ("height_m", pytest.approx(0.2), pytest.approx(0.25))
-    base.record["device"] = "cuda:0"
+    change(base, device="cuda:0")
     assert effect(Change("x", {}), "mpm", run, base).saved == pytest.approx(0.05)
     gone = effect(Change("x", {}), "mpm", finished(measures={"height_m": 0.005}), base)
     assert (gone.length, gone.moved) == ("bead_width_m", 1.0)
@@ -165,34 +185,42 @@ def test_a_mix_must_save_itself():
     assert broken is None
 
 
-def test_everything_is_run_once_and_what_is_impossible_is_said(monkeypatch):
-    planned = []
-
-    def execute(jobs, store, hooks, workers=1):
-        planned.append(list(jobs))
-        return [finished(j.method, measures={"height_m": 1.0}, cpu_s=0.5 if j.scenario["spacing"] > 4e-3 else 1.0)
-                for j in jobs]  # fmt: skip
-
-    monkeypatch.setattr(module, "execute", execute)
+def test_everything_is_run_once_and_what_is_impossible_is_said(tmp_path, monkeypatch):
+    planned = working(
+        monkeypatch,
+        lambda job: finished(
+            job.method, measures={"height_m": 1.0}, cpu_s=0.5 if job.scenario["spacing"] > 4e-3 else 1.0
+        ),
+    )
+    place = workplace_in(tmp_path)
     coarse = BEAD.model_copy(update={"spacing": 5e-3})  # 1.25 times that does not fit twice into the nozzle
-    done = ablate(coarse, ["mpm", "pbd"], 0.05, None, None, 2, Target(), 7.0)
+    done = ablation(coarse, ["mpm", "pbd"], 0.05, place)
     assert [line.partition(": not possible here")[0] for line in done.impossible] == [
-        "mpm: coarser spacing", "pbd: coarser spacing",
-    ]  # fmt: skip
+        "mpm: coarser spacing",
+        "pbd: coarser spacing",
+    ]
     first = planned[0]
     assert [j.method for j in first[:2]] == ["mpm", "pbd"] and {j.wall_limit for j in first} == {7.0}
-    assert first[0].scenario == coarse.model_dump(mode="json")
+    assert first[0].scenario == coarse.model_dump(mode="json") and first.workers == 2
     count = len(changes(coarse, ["mpm", "pbd"]))
     assert len(done.effects) == len(first) - 2 == 2 * (count - 6 - 1) + 6
     assert all(e.change.method in (None, e.method) for e in done.effects) and done.lean == {} and len(planned) == 1
-    fine = ablate(BEAD.model_copy(update={"spacing": 3.5e-3}), ["mpm"], 0.05, None, None, 2, Target(), 7.0)
+    fine = ablation(BEAD.model_copy(update={"spacing": 3.5e-3}), ["mpm"], 0.05, place)
     assert fine.lean["mpm"].change.name == "coarser spacing" and fine.lean["mpm"].saved == pytest.approx(0.5)
-    assert planned[-1][0].scenario["spacing"] == pytest.approx(4.375e-3)
+    assert planned[-1][0].scenario["spacing"] == pytest.approx(4.375e-3) and planned[-1].workers == 1  # to be timed
 
 
-def test_no_mix_is_sought_of_a_method_that_does_not_run(monkeypatch):
-    monkeypatch.setattr(module, "execute", lambda jobs, *_: [finished(j.method, "diverged") for j in jobs])
-    assert ablate(BEAD, ["mpm"], 0.05, None, None, 1, Target(), 7.0).lean == {}
+def test_no_mix_is_sought_of_a_method_that_does_not_run(tmp_path, monkeypatch):
+    working(monkeypatch, lambda job: finished(job.method, "diverged"))
+    assert ablation(BEAD, ["mpm"], 0.05, workplace_in(tmp_path)).lean == {}
+
+
+@pytest.mark.parametrize(("verdict", "fine"), [("completed", True), ("diverged", True), ("error", False)])
+def test_an_ablation_is_whole_when_nothing_is_lacking(tmp_path, monkeypatch, verdict, fine):
+    working(monkeypatch, lambda job: finished(job.method, verdict, measures={"height_m": 1.0}, reason="x"))
+    made = ablate(BEAD, "mpm", called="line_bead", out=tmp_path, progress=False)
+    assert (made.ok, not made.missing, made.root) == (fine, fine, tmp_path)
+    assert len(made.table) == len(made.found.effects) == len(made.runs) - 1 == len(changes(BEAD, ["mpm"]))
 
 
 def test_what_an_ablation_lacks():
@@ -218,9 +246,15 @@ def test_the_command_of_a_mix_replaces_what_was_given():
 
 @pytest.mark.parametrize(
     ("moved", "saved", "word"),
-    [(0.0501, 0.9, "needed"), (0.05, 0.9, "droppable"), (0.05, 0.05, "idle"), (0.05, 0.051, "droppable"),
-     (0.0, -0.3, "idle"), (math.nan, 0.9, "needed")],
-)  # fmt: skip
+    [
+        (0.0501, 0.9, "needed"),
+        (0.05, 0.9, "droppable"),
+        (0.05, 0.05, "idle"),
+        (0.05, 0.051, "droppable"),
+        (0.0, -0.3, "idle"),
+        (math.nan, 0.9, "needed"),
+    ],
+)
 def test_a_change_is_needed_droppable_or_idle(moved, saved, word):
     assert page.verdict(seen("a", moved, saved), 0.05) == word
     assert page.verdict(seen("a", moved, saved, verdict="diverged"), 0.05) == "diverged"
@@ -229,7 +263,6 @@ def test_a_change_is_needed_droppable_or_idle(moved, saved, word):
 def test_the_page_names_what_is_needed_and_the_leanest_mix(tmp_path):
     effects = [seen("a", 0.2, 0.1), seen("b", 0.01, 0.25), seen("c", 0.0, 0.0), seen("d", math.nan, 0, verdict="error")]
     for e in effects:
-        e.run.record["key"] = "k"
         object.__setattr__(e.run, "folder", tmp_path / "runs" / e.change.name)
     lean = seen("b", 0.0123, 0.256)
     object.__setattr__(lean.run, "folder", tmp_path / "runs" / "lean")
@@ -242,11 +275,13 @@ def test_the_page_names_what_is_needed_and_the_leanest_mix(tmp_path):
         ["d", "mpm", "-", "height_m", "0.0 %", "error"],
     ]
     assert made.findings == [
-        "sph: the scenario itself ended as timeout.", "no way", "mpm: needed: a; droppable: b.",
+        "sph: the scenario itself ended as timeout.",
+        "no way",
+        "mpm: needed: a; droppable: b.",
         "mpm: leanest within 5%: b: saves 26% of the time, moves height_m by 1.2%. Alone: "
         "fluidbench run line_bead --solver mpm --set seed=3 --set b=1",
         "sph: needed: nothing; droppable: nothing.",
-    ]  # fmt: skip
+    ]
     assert [t.label for t in made.plots[0].traces] == ["mpm"] and len(made.data) == 5
     assert list(made.plots[0].traces[0].x) == pytest.approx([10.0, 25.0, 0.0])
     assert list(made.plots[0].traces[0].y) == pytest.approx([20.0, 1.0, 0.0])

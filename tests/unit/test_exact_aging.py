@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.scene import Scene
+from fluidbench.native.scene import Scene
 from solvers import aging
 
 from ..conftest import scenario
@@ -55,8 +55,12 @@ def test_shear_stress_carries_over(elastic):
 def test_pressure_and_present_volume_carry_over_where_j_is_integrated(ratio):
     """K (1 / J - 1) stays, with K fourfold; V0 J stays."""
     two = Two(ratio=ratio)
-    wp.launch(aging.harden_at_ratio, 3, [3, two.count, two.phases, two.due],
-              [two.phase, two.volume, two.ratio, two.normal, two.shear])  # fmt: skip
+    wp.launch(
+        aging.harden_at_ratio,
+        3,
+        [3, two.count, two.phases, two.due],
+        [two.phase, two.volume, two.ratio, two.normal, two.shear],
+    )
     two.check()
     j, volume = two.ratio.numpy().astype(float), two.volume.numpy().astype(float)
     assert 4 * K * (1 / j[0] - 1) == pytest.approx(K * (1 / ratio - 1), rel=1e-4)
@@ -68,8 +72,12 @@ def test_pressure_and_present_volume_carry_over_where_j_is_integrated(ratio):
 def test_pressure_carries_over_where_density_is_integrated(density):
     """K (rho / rho0 - 1) stays, with K fourfold and rho as it is: rho0 = m / V changes."""
     two = Two(density=density)
-    wp.launch(aging.harden_at_density, 3, [1, 3, two.count, two.phases, two.due, two.mass, two.density],
-              [two.phase, two.volume, two.normal, two.shear])  # fmt: skip
+    wp.launch(
+        aging.harden_at_density,
+        3,
+        [1, 3, two.count, two.phases, two.due, two.mass, two.density],
+        [two.phase, two.volume, two.normal, two.shear],
+    )
     two.check()
     rest = 1e-3 / two.volume.numpy().astype(float)
     assert 4 * K * (density / rest[0] - 1) == pytest.approx(K * (density / 1000.0 - 1), rel=1e-3)

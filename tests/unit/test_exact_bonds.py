@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.particles import CARRIED, CLAMPED, FREE
-from fluidbench.scene import Scene
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.scene import Scene
 from solvers.pbd import bonds
 from solvers.pbd.laws import bond_stiffness
 
@@ -39,8 +39,11 @@ class Pair:
         return self.bonds.rest.numpy().tolist()
 
     def harden(self, *due):
-        wp.launch(bonds.relieve, 2, [2, self.count, self.box, self.table, self.phase, wp.array(due, dtype=int),
-                                     self.position, self.bonds])  # fmt: skip
+        wp.launch(
+            bonds.relieve,
+            2,
+            [2, self.count, self.box, self.table, self.phase, wp.array(due, dtype=int), self.position, self.bonds],
+        )
         return self.rest()
 
     def flow(self):
@@ -116,7 +119,14 @@ def test_a_bond_pulls_by_a_damped_step_of_xpbd():
 def test_the_stiffness_of_a_bond_by_its_length():
     """k (1, 1/2, 3/16) at d (1, sqrt 2, sqrt 3), with E = 15 k / (8 d); linear in between."""
     k = 8.0 / 15.0 * E * D
-    shares = {0.9: 1.0, 1.0: 1.0, math.sqrt(2.0): 0.5, math.sqrt(3.0): 0.1875, 0.5 * (1 + math.sqrt(2.0)): 0.75,
-              0.5 * (math.sqrt(2.0) + math.sqrt(3.0)): 0.34375, 1.9: 0.05}  # fmt: skip
+    shares = {
+        0.9: 1.0,
+        1.0: 1.0,
+        math.sqrt(2.0): 0.5,
+        math.sqrt(3.0): 0.1875,
+        0.5 * (1 + math.sqrt(2.0)): 0.75,
+        0.5 * (math.sqrt(2.0) + math.sqrt(3.0)): 0.34375,
+        1.9: 0.05,
+    }
     for ratio, share in shares.items():
         assert bond_stiffness(E, D, ratio * D) == pytest.approx(share * k, rel=1e-5)

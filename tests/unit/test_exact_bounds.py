@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fluidbench.solver import get_solver
-from fluidbench.timestep import Bound, damped_limit, lost_speed, plan
+from fluidbench.method.timestep import Bound, damped_limit, lost_speed, plan
+from fluidbench.registry import get_method
 
 from ..conftest import scenario
 
@@ -19,7 +19,7 @@ def bounds(method, speed=V, numerics=None, **table):
     material = {"density": 1000.0, "sound_speed": C, **table.pop("material", {})}
     domain = {"lower": [0, 0, 0], "upper": [0.2, 0.2, 0.15]}
     s = scenario(material=material, domain=domain, spacing=D, **table)
-    solver = get_solver(method)
+    solver = get_method(method)
     return {b.name: b.dt for b in solver.bounds(s, solver.Config(**(numerics or {})), speed)}
 
 
@@ -67,8 +67,12 @@ def test_sph_by_hand(material, ratio, alpha):
 
 def test_sph_follows_its_settings_and_leaves_out_what_is_not_there():
     settings = {
-        "smoothing_ratio": 2.0, "cfl": 0.2, "viscous_number": 0.05, "force_number": 0.5, "artificial_viscosity": 0.02,
-    }  # fmt: skip
+        "smoothing_ratio": 2.0,
+        "cfl": 0.2,
+        "viscous_number": 0.05,
+        "force_number": 0.5,
+        "artificial_viscosity": 0.02,
+    }
     got = bounds("sph", numerics=settings, gravity=[0, 0, -4.0])
     expected = {"acoustic": 0.2 * 0.02 / 15.0, "viscous": 0.05 * 4e-4 / 4.8e-4, "force": 0.5 * math.sqrt(0.02 / 4.0)}
     assert got == pytest.approx(expected)
@@ -92,7 +96,7 @@ def test_pbd_by_hand():
 def test_formulas_name_the_numbers_that_were_used():
     made = {}
     for method in ("mpm", "sph", "pbd"):
-        solver, s = get_solver(method), scenario(material={"density": 1000.0, "viscosity": 5.0})
+        solver, s = get_method(method), scenario(material={"density": 1000.0, "viscosity": 5.0})
         made |= {f"{method} {b.name}": b.formula for b in solver.bounds(s, solver.Config(), V)}
     assert made["mpm acoustic"].startswith("0.8 dx") and made["mpm advective"].startswith("0.5 dx")
     assert made["mpm viscous"].startswith("0.8 dx^2 / (4 nu)")
@@ -118,7 +122,7 @@ def test_formulas_name_the_numbers_that_were_used():
     ],
 )
 def test_settings_that_no_bound_could_answer_for_are_refused(method, key, accepted, refused):
-    settings = get_solver(method).Config
+    settings = get_method(method).Config
     for value in accepted:
         assert getattr(settings(**{key: value}), key) == value
     for value in refused:

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from fluidbench.study.evidence import SHIPPED
-from fluidbench.study.table1 import bead_width, claims, grid_artifacts, physical_accuracy, prediction
-from fluidbench.study.verdicts import CONFIRMED, OPEN, REFUTED
+from fluidbench.paper.evidence import SHIPPED
+from fluidbench.paper.table1 import bead_width, claims, grid_artifacts, physical_accuracy, prediction
+from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
 
 from .made import case, evidence, finished, known, repeated, trial
 
@@ -14,8 +14,10 @@ from .made import case, evidence, finished, known, repeated, trial
 def grids(**areas):
     """Beads whose area is off by these shares of Q / V, by particles along a cell's edge."""
     exact = math.pi * 0.012**2 / 4
-    return {float(g[1:].replace("_", ".")): [finished(measures={"bead_area_m2": exact * (1 + a)}) for a in v]
-            for g, v in areas.items()}  # fmt: skip
+    return {
+        float(g[1:].replace("_", ".")): [finished(measures={"bead_area_m2": exact * (1 + a)}) for a in v]
+        for g, v in areas.items()
+    }
 
 
 @pytest.mark.parametrize(
@@ -85,8 +87,12 @@ def test_claims_of_prohibitive_steps_and_of_the_highest_cost():
 def test_a_prediction_fails_on_most_known_answers(errors, verdict):
     names = [f"c{i}" for i in range(len(errors))]
     rows = [trial(case(n), "pbd", e, verdict="pass" if e < 0.1 else "MISS") for n, e in zip(names, errors, strict=True)]
-    noise = [trial(case("c0"), "mpm", 0.01), trial(case("z"), "pbd", 0.01), trial(case("c0"), "pbd", 0.0, level="fine"),
-             trial(case("c0"), "pbd", verdict="skipped")]  # fmt: skip
+    noise = [
+        trial(case("c0"), "mpm", 0.01),
+        trial(case("z"), "pbd", 0.01),
+        trial(case("c0"), "pbd", 0.0, level="fine"),
+        trial(case("c0"), "pbd", verdict="skipped"),
+    ]
     cell = prediction(evidence(rows + noise), "word", names)
     assert cell.verdict == verdict and len(cell.runs) == len(errors)
     told = ", ".join(f"{n}: error {e:.2g} of 0.1" for n, e in zip(names, errors, strict=True))
@@ -94,9 +100,17 @@ def test_a_prediction_fails_on_most_known_answers(errors, verdict):
 
 
 def test_predictions_name_their_cases_and_what_is_shipped():
-    by_word = {c.paper: c for c in claims(evidence([
-        trial(case("slump_slip"), "pbd", 0.9, note=SHIPPED), trial(case("cantilever_sag"), "pbd", verdict="diverged"),
-    ]))}  # fmt: skip
+    by_word = {
+        c.paper: c
+        for c in claims(
+            evidence(
+                [
+                    trial(case("slump_slip"), "pbd", 0.9, note=SHIPPED),
+                    trial(case("cantilever_sag"), "pbd", verdict="diverged"),
+                ]
+            )
+        )
+    }
     assert by_word["cannot predict collapse"].measured == f"slump_slip: error 0.9 of 0.1 ({SHIPPED})"
     assert by_word["cannot predict deformation under load"].measured == "cantilever_sag: diverged"
 

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from fluidbench.layout import capacity_of
-from fluidbench.particles import CARRIED, CLAMPED, FREE, Pool
-from fluidbench.process.contact import Contact
-from fluidbench.process.laying import Laying
-from fluidbench.scene import Scene
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.pool import Pool
+from fluidbench.native.process.contact import Contact
+from fluidbench.native.process.placement import Placement
+from fluidbench.native.scene import Scene
+from fluidbench.scenario.layout import capacity_of
 
 from ..conftest import scenario
 
@@ -25,13 +26,17 @@ def touch(places, velocities, held=0, friction=0.3, parts=(BLOCK,), substeps=1, 
     path = {"start": [0.0, 0.0], "speed": speed, **({"end": [0.1, 0.0]} if speed else {"dwell": 1.0})}
     body = {"kind": "box", "center": [-0.2, 0.0, 0.02], "size": [0.04, 0.04, 0.01 * max(n - spare, 16) / 16]}
     table = scenario(
-        domain={"lower": [-0.3] * 3, "upper": [0.3] * 3}, spacing=D, bodies=[body], toolpath=path, duration=1.0,
+        domain={"lower": [-0.3] * 3, "upper": [0.3] * 3},
+        spacing=D,
+        bodies=[body],
+        toolpath=path,
+        duration=1.0,
         nozzle={"diameter": 0.02, "exit_speed": 1e-3, "standoff": 0.35},
         collider={"parts": list(parts), "clearance": 0.01, "friction": friction},
-    )  # fmt: skip
+    )
     scene = Scene([table, table])
     pool = Pool(scene, capacity_of(table))
-    Laying(table, pool)
+    Placement(table, pool)
     for name, values in (("position", places), ("velocity", velocities), ("held", held)):
         full = pool.fields[name].numpy().copy()
         for world in range(2):

@@ -100,9 +100,13 @@ def columns(profiles):
     return Deposit(np.array([1.0, 2.0, 3.0]), D, np.array(profiles, float))
 
 
-STEPS = columns([
-    [[1, 1, 0, 0], [1, 0.5, 0, 0]], [[1, 1, 0.8, 0.2], [0, 0, 0, 0]], [[0.4, 0, 0, 0], [1, 1, 1, 0.9]],
-])  # fmt: skip
+STEPS = columns(
+    [
+        [[1, 1, 0, 0], [1, 0.5, 0, 0]],
+        [[1, 1, 0.8, 0.2], [0, 0, 0, 0]],
+        [[0.4, 0, 0, 0], [1, 1, 1, 0.9]],
+    ]
+)
 
 
 def test_columns_hold_their_material_as_if_it_were_solid():
@@ -174,9 +178,16 @@ def section(fill, across=0.2, up=0.1):
 
 def test_a_section_encloses_its_holes_and_has_its_extents():
     """Across runs along rows: five columns from 1 to 4 filled, the third with a hole, the last overhanging."""
-    made = section([
-        [0.49, 0, 0, 0, 0], [0.5, 1, 1, 0, 0], [1, 0.1, 1, 0, 0], [1, 1, 1, 0, 0], [0, 0, 0.6, 0.7, 0], [0, 0, 0, 0, 0],
-    ])  # fmt: skip
+    made = section(
+        [
+            [0.49, 0, 0, 0, 0],
+            [0.5, 1, 1, 0, 0],
+            [1, 0.1, 1, 0, 0],
+            [1, 1, 1, 0, 0],
+            [0, 0, 0.6, 0.7, 0],
+            [0, 0, 0, 0, 0],
+        ]
+    )
     assert made.solid.sum() == 11 and made.solid[2, 1] and not made.solid[0, 0]
     assert made.area == pytest.approx(11 * 0.2 * 0.1)
     assert made.width == pytest.approx(4 * 0.2) and made.height == pytest.approx(4 * 0.1)

@@ -4,23 +4,30 @@ from pathlib import Path
 
 import pytest
 
-from fluidbench.body import Body
-from fluidbench.collider import Collider, Part
-from fluidbench.cure import Cure
-from fluidbench.expansion import Expansion
-from fluidbench.material import Material
+from fluidbench.registry import get_method
 from fluidbench.scenario import Domain, Nozzle, Scenario, Walls
-from fluidbench.solver import get_solver
-from fluidbench.toolpath import Toolpath
+from fluidbench.scenario.body import Body
+from fluidbench.scenario.collider import Collider, Part
+from fluidbench.scenario.cure import Cure
+from fluidbench.scenario.expansion import Expansion
+from fluidbench.scenario.material import Material
+from fluidbench.scenario.toolpath import Toolpath
 
 from ..conftest import scenario
 
 MODELS = {
-    "Top level": [Scenario], "[domain]": [Domain], "[domain.walls]": [Walls], "[material]": [Material],
-    "[material.cure]": [Cure], "[material.expansion]": [Expansion], "[nozzle]": [Nozzle], "[toolpath]": [Toolpath],
-    "[collider]": [Collider, Part], "[[bodies]]": [Body],
-    **{f"[numerics.{method}]": [get_solver(method).Config] for method in ("mpm", "sph", "pbd")},
-}  # fmt: skip
+    "Top level": [Scenario],
+    "[domain]": [Domain],
+    "[domain.walls]": [Walls],
+    "[material]": [Material],
+    "[material.cure]": [Cure],
+    "[material.expansion]": [Expansion],
+    "[nozzle]": [Nozzle],
+    "[toolpath]": [Toolpath],
+    "[collider]": [Collider, Part],
+    "[[bodies]]": [Body],
+    **{f"[numerics.{method}]": [get_method(method).Config] for method in ("mpm", "sph", "pbd")},
+}
 TABLES = {"cure", "expansion", "parts"}  # which have rows of their own
 WORDS = {"none": None, "(empty)": "", "true": True, "false": False, "()": (), "{}": {}}
 
@@ -68,7 +75,7 @@ def moving(speed, **material):
 
 
 def refusal(method, made, **settings):
-    solver = get_solver(method)
+    solver = get_method(method)
     return solver.refuses(made, solver.Config(**settings))
 
 
@@ -95,7 +102,7 @@ def test_pbd_refuses_yield_stresses_that_no_substep_conveys():
 
 def test_pbd_says_how_much_of_a_viscosity_and_of_a_stiffness_is_lost():
     """rho 8 H^2 / (22 dt) with H = 24 mm is 167.6 Pa s; G = 32 kPa acts in series with the 32 kPa of a substep."""
-    solver = get_solver("pbd")
+    solver = get_method("pbd")
     thick = solver.approximates(moving(1.0, viscosity=170.0), solver.Config())
     assert any("viscosity 170 Pa s acts like at most 168 Pa s" in words for words in thick)
     assert len(solver.approximates(moving(1.0, viscosity=167.0), solver.Config())) == 1

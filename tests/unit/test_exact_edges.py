@@ -1,23 +1,23 @@
 """Edges of the input that the other tables leave open: units other than one, lower corners beyond zero, exact ends."""
 
-import importlib
 import math
 
 import pytest
 from pydantic import ValidationError
 
-from fluidbench import library
-from fluidbench.body import Body
-from fluidbench.cure import Cure
+from fluidbench.cli.options import budget_of, placed
 from fluidbench.errors import UserError
-from fluidbench.extent import ADDRESSABLE, RESOLVED
-from fluidbench.model import check_number
-from fluidbench.particles import Pool
-from fluidbench.scene import Scene
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import Scene
+from fluidbench.scenario import library
+from fluidbench.scenario.body import Body
+from fluidbench.scenario.cure import Cure
+from fluidbench.scenario.extent import ADDRESSABLE, RESOLVED
+from fluidbench.scenario.model import check_number
+from fluidbench.study.workplace import Workplace, methods_of, target_of
 
 from ..conftest import bead, scenario
 
-app = importlib.import_module("fluidbench.cli.app")
 CUBE = {"kind": "box", "center": [0.1] * 3, "size": [0.04] * 3}
 
 
@@ -75,14 +75,21 @@ def test_sizes_are_counted_in_spacings(d):
 
 def test_a_periodic_axis_is_as_long_as_from_face_to_face():
     walls = {"y_lower": "periodic", "y_upper": "periodic"}
-    refused("y has 5.99", domain={"lower": [0, 0.04, 0], "upper": [0.2, 0.0999, 0.2], "walls": walls},
-            bodies=[{"kind": "box", "center": [0.1, 0.07, 0.1], "size": [0.04] * 3}])  # fmt: skip
+    refused(
+        "y has 5.99",
+        domain={"lower": [0, 0.04, 0], "upper": [0.2, 0.0999, 0.2], "walls": walls},
+        bodies=[{"kind": "box", "center": [0.1, 0.07, 0.1], "size": [0.04] * 3}],
+    )
 
 
 def test_bodies_that_only_touch_the_domain_lie_outside():
     for center in ([0.25, 0.125, 0.125], [-0.125, 0.125, 0.125]):
-        refused("lies outside", domain={"lower": [0, 0, 0], "upper": [0.125 + 0.0625] * 3}, spacing=0.03125,
-                bodies=[{"kind": "box", "center": center, "size": [0.125 if center[0] > 0 else 0.25] * 3}])  # fmt: skip
+        refused(
+            "lies outside",
+            domain={"lower": [0, 0, 0], "upper": [0.125 + 0.0625] * 3},
+            spacing=0.03125,
+            bodies=[{"kind": "box", "center": center, "size": [0.125 if center[0] > 0 else 0.25] * 3}],
+        )
     late = scenario(bodies=[CUBE | {"start": 0.75}], duration=1.0, tick=0.25, output_interval=0.5)
     assert late.bodies[0].start == 0.75
 
@@ -147,15 +154,23 @@ def test_a_new_pool_is_empty():
     assert pool.count.numpy().tolist() == [0, 0] and pool.fault.numpy().tolist() == [0] and pool.stale
 
 
-def test_methods_and_devices_must_exist(tmp_path, monkeypatch):
+def test_methods_and_devices_must_exist():
     with pytest.raises(UserError, match="did you mean 'mpm'"):
-        app.methods_of("mpm,mpn")
+        methods_of(["mpm", "mpn"])
     with pytest.raises(UserError, match="no device 'cuda:99' on this machine; it has cpu"):
-        app.target_of("cuda:99", "warp", 1)
+        target_of("cuda:99", "warp", 1)
+
+
+def test_results_lie_where_they_are_asked_to_or_by_their_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert app.store_in(None, "name", True).root == tmp_path / "fluidbench-out" / "name"
-    assert app.store_in(tmp_path / "x", "name", False).root == tmp_path / "x" and app.store_in(None, "n", True).fresh
+
+    def store(**options):
+        return Workplace.of(placed(options, "name"), 1.0).store
+
+    assert store(fresh=True).root == tmp_path / "fluidbench-out" / "name"
+    assert store(out=tmp_path / "x").root == tmp_path / "x" and store(fresh=True).fresh and not store().fresh
+    assert not list(tmp_path.iterdir())
 
 
 def test_budgets_without_an_end_are_infinite_alone():
-    assert all(math.isinf(v) and v > 0 for v in app.budget_of("none"))
+    assert all(math.isinf(v) and v > 0 for v in budget_of("none"))

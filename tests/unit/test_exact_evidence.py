@@ -1,59 +1,82 @@
 """What the judged table runs, in both frameworks, and what the printed tower's timing says of the paper's claims."""
 
 import math
+from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
-from fluidbench.run import Job
-from fluidbench.study import evidence as module
+from fluidbench.method.target import Target
+from fluidbench.paper import evidence as module
+from fluidbench.paper.cells import all_runs, figures, runs_of
+from fluidbench.paper.evidence import COST_CASES, DEAR, METHODS, SHIPPED, Evidence, gather, levels_of, shipped
+from fluidbench.runs.experiment import Experiment
+from fluidbench.runs.job import Job
+from fluidbench.runs.record import Run
 from fluidbench.study.case import cases
-from fluidbench.study.cells import all_runs, figures, runs_of
-from fluidbench.study.evidence import COST_CASES, DEAR, METHODS, SHIPPED, Evidence, gather, levels_of, planned, shipped
-from fluidbench.target import Target
 
 from .made import BEAD, case, evidence, finished, known, trial
 
 TAICHI = Target(backend="taichi")
 
 
+@dataclass(frozen=True)
+class Wanted(Run):
+    """A run that remembers what was asked for."""
+
+    wanted: Job | None = None
+
+
+class Place(SimpleNamespace):
+    """A workplace where nothing is run: calls as lists of work, and whether it may run together."""
+
+    def __init__(self):
+        super().__init__(target=Target(), wall_limit=77.0, calls=[], together=[])
+
+    def run(self, planned, title, together=False):
+        self.calls.append(list(planned))
+        self.together.append(together)
+        return [self.made(work) for work in planned]
+
+    def made(self, work):
+        if isinstance(work, Experiment):
+            return {"method": work.method, "verdict": "held", "value": work.task["value"]}
+        run = finished(work.method, spacing=work.scenario["spacing"])
+        return Wanted(run.record, run.folder, wanted=work)
+
+
 @pytest.fixture
-def gathered(monkeypatch):
-    """What `gather` asks for: calls of execute as lists of jobs, and the tasks of stability."""
-    calls: list[list[Job]] = []
-    points: list[dict] = []
-
-    def execute(planned, store, hooks):
-        calls.append(list(planned))
-        return [finished(j.method, spacing=j.scenario["spacing"], wanted=j) for j in planned]
-
-    def measure(tasks, store, workers, done):
-        points.extend(task for _, task in tasks)
-        return [{"method": task["method"], "verdict": "held", "value": task["value"]} for _, task in tasks]
-
-    monkeypatch.setattr(module, "execute", execute)
-    monkeypatch.setattr(module, "measure_points", measure)
-    found = gather(BEAD, [], 3, False, None, None, 1, Target(), 77.0)
-    return found, calls, points
+def gathered():
+    """What `gather` asks for: calls as lists of jobs, and the tasks of stability."""
+    place = Place()
+    found = gather(BEAD, [], 3, False, place)
+    *calls, points = place.calls
+    return found, calls, [work.task for work in points]
 
 
 def numerics(run, method, key):
-    return run.record["wanted"].scenario["numerics"][method][key]
+    return run.wanted.scenario["numerics"][method][key]
 
 
 def test_the_scenario_runs_through_every_method_and_backend(gathered):
     found, calls, _ = gathered
     for m in METHODS:
-        assert [(r.record["wanted"].repeat, r.record["spacing_m"]) for r in found.repeats[m]] == [
-            (0, 1.5e-3), (1, 1.5e-3), (2, 1.5e-3)
-        ]  # fmt: skip
-        assert [r.record["wanted"].target.backend for r in found.other[m]] == ["taichi", "taichi"]
-        assert [r.record["wanted"].repeat for r in found.other[m]] == [0, 1]
-        assert found.second[m].record["spacing_m"] == pytest.approx(2e-3)
-        assert found.second[m].record["method"] == m
-    made = [job for call in calls for job in call]
-    assert len(made) == planned(3, Target()) == 42 and {job.wall_limit for job in made} == {77.0}
-    assert all(job.target.backend == "warp" for job in made if job.method and job not in
-               [r.record["wanted"] for runs in found.other.values() for r in runs])  # fmt: skip
+        assert [(r.wanted.repeat, r.record.spacing_m) for r in found.repeats[m]] == [
+            (0, 1.5e-3),
+            (1, 1.5e-3),
+            (2, 1.5e-3),
+        ]
+        assert [r.wanted.target.backend for r in found.other[m]] == ["taichi", "taichi"]
+        assert [r.wanted.repeat for r in found.other[m]] == [0, 1]
+        assert found.second[m].record.spacing_m == pytest.approx(2e-3)
+        assert found.second[m].method == m
+    (made,) = calls  # at once, so that what is wanted twice is run once
+    assert len(made) == 42 and {job.wall_limit for job in made} == {77.0}
+    assert all(
+        job.target.backend == "warp"
+        for job in made
+        if job.method and job not in [r.wanted for runs in found.other.values() for r in runs]
+    )
     assert len(found.runs()) == 42
 
 
@@ -63,13 +86,13 @@ def test_sweeps_have_two_resolutions(gathered):
     assert list(found.grids) == [1.0, 1.5, 2.0, 3.0]
     for g, runs in found.grids.items():
         assert [numerics(r, "mpm", "grid_ratio") for r in runs] == [g, g]
-        assert [r.record["spacing_m"] * g for r in runs] == pytest.approx([2.25e-3, 3e-3])
+        assert [r.record.spacing_m * g for r in runs] == pytest.approx([2.25e-3, 3e-3])
     assert list(found.iterations) == [1, 2, 5, 10] and list(found.advances) == [0.0625, 0.125, 0.25, 0.5]
     for key, sweep in (("iterations", found.iterations), ("advance", found.advances)):
         for value, runs in sweep.items():
             assert [numerics(r, "pbd", key) for r in runs] == [value, value]
-            assert [r.record["spacing_m"] for r in runs] == pytest.approx([1.5e-3, 2e-3])
-            assert {r.record["method"] for r in runs} == {"pbd"}
+            assert [r.record.spacing_m for r in runs] == pytest.approx([1.5e-3, 2e-3])
+            assert {r.method for r in runs} == {"pbd"}
 
 
 def test_limits_are_measured_at_two_spacings(gathered):
@@ -80,11 +103,17 @@ def test_limits_are_measured_at_two_spacings(gathered):
     assert {m: [r["value"] for r in rows] for m, rows in found.limits.items()} == {m: [0.5, 1.0] for m in METHODS}
 
 
-def test_one_backend_alone_is_no_pair(gathered, monkeypatch):
+def test_times_are_measured_one_at_a_time_and_limits_are_not():
+    place = Place()
+    gather(BEAD, [], 3, False, place)
+    assert place.together == [False, True]
+
+
+def test_one_backend_alone_is_no_pair(monkeypatch):
     monkeypatch.setattr(Target, "other", property(lambda _: None))
-    alone = gather(BEAD, [], 2, True, None, None, 1, Target(), 1.0)
-    assert alone.other == {} and planned(2, Target()) == 33
-    assert planned(5, Target()) == 42
+    alone = gather(BEAD, [], 2, True, Place())
+    assert alone.other == {} and len(alone.runs()) == 33
+    assert len(gather(BEAD, [], 5, True, Place()).runs()) == 42
 
 
 def test_levels_and_cases_of_a_quick_study():
@@ -114,10 +143,23 @@ def test_shipped_answers_are_those_of_the_dear_cases():
 def test_shipped_answers_leave_out_what_was_skipped_or_has_no_error(monkeypatch):
     import pandas as pd
 
-    row = {"case": "slump_slip", "method": "mpm", "verdict": "pass", "error": 0.1, "spacing_m": 1.0, "particles": 1,
-           "wall_s": 1.0, "wall_per_simulated_s": 1.0}  # fmt: skip
-    rows = [row, row | {"method": "sph", "verdict": "skipped"}, row | {"method": "law"}, row | {"case": "free_fall"},
-            row | {"method": "pbd", "verdict": "timeout", "error": math.nan}]  # fmt: skip
+    row = {
+        "case": "slump_slip",
+        "method": "mpm",
+        "verdict": "pass",
+        "error": 0.1,
+        "spacing_m": 1.0,
+        "particles": 1,
+        "wall_s": 1.0,
+        "wall_per_simulated_s": 1.0,
+    }
+    rows = [
+        row,
+        row | {"method": "sph", "verdict": "skipped"},
+        row | {"method": "law"},
+        row | {"case": "free_fall"},
+        row | {"method": "pbd", "verdict": "timeout", "error": math.nan},
+    ]
     monkeypatch.setattr(module, "reference", lambda _: pd.DataFrame(rows))
     assert [(t.method, t.finding is None) for t in shipped()] == [("mpm", False), ("pbd", True)]
 
@@ -131,17 +173,28 @@ def test_what_is_missing_is_every_run_trial_and_point_that_says_nothing():
     ]
     e = evidence([quiet, told], limits={"sph": points}, other_trials=[trial(case("o"), "sph", verdict="timeout")])
     assert e.missing() == [
-        "line_bead, sph, d = 1 mm: timeout: ", "q, mpm, d = 10 mm: error: ", "stability, spacing = 0.5, sph: error: r",
-    ]  # fmt: skip
+        "line_bead, sph, d = 1 mm: timeout: ",
+        "q, mpm, d = 10 mm: error: ",
+        "stability, spacing = 0.5, sph: error: r",
+    ]
     bad = [finished(f"m{i}", "error") for i in range(6)]
-    full = Evidence(BEAD, [], {"mpm": [bad[0]]}, {"mpm": bad[1]}, {1.0: [bad[2]]}, {1: [bad[3]]}, {0.1: [bad[4]]}, {},
-                    {"mpm": [bad[5]]})  # fmt: skip
+    full = Evidence(
+        BEAD,
+        [],
+        {"mpm": [bad[0]]},
+        {"mpm": bad[1]},
+        {1.0: [bad[2]]},
+        {1: [bad[3]]},
+        {0.1: [bad[4]]},
+        {},
+        {"mpm": [bad[5]]},
+    )
     assert {id(r) for r in full.runs()} == {id(r) for r in bad} and len(full.missing()) == 6
 
 
 def test_figures_need_every_repeat():
     runs = {"mpm": [finished(wall_s=2.0), finished(wall_s=3.0)], "sph": [finished("sph", "diverged")], "pbd": []}
     assert figures(runs, "wall_s") == {"mpm": [2.0, 3.0]}
-    assert [r.record["method"] for r in all_runs(evidence())] == ["mpm", "mpm", "sph", "sph", "pbd", "pbd"]
+    assert [r.method for r in all_runs(evidence())] == ["mpm", "mpm", "sph", "sph", "pbd", "pbd"]
     rows = known("mpm", 2, 1)
     assert runs_of(rows) == [r for t in rows for r in t.runs.values()]

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from fluidbench.particles import CARRIED, FREE, OutOfCapacity, Pool
-from fluidbench.process.expansion import Growing
-from fluidbench.process.laying import Laying
-from fluidbench.scene import Scene
+from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.pool import OutOfCapacity, Pool
+from fluidbench.native.process.expansion import Growing
+from fluidbench.native.process.placement import Placement
+from fluidbench.native.scene import Scene
 
 from ..conftest import scenario
 
@@ -25,7 +26,7 @@ def growing(model, side=4, center=(0.05, 0.1, 0.1), generations=3, capacity=20_0
     s = scenario(bodies=[body], material=material, domain=domain, spacing=D, seed=seed)
     pool = Pool(Scene([s] * worlds), capacity)
     grown = Growing(pool.scene, pool, side**3, generations)
-    Laying(s, pool)
+    Placement(s, pool)
     for name, values in fields.items():
         full = pool.fields[name].numpy().copy()
         full[: side**3] = values
@@ -127,7 +128,7 @@ SPAWN = {"kind": "spawn", "ratio": 8.0, "delay": 0.2}
 
 
 def families(pool, ancestors):
-    """(slots of the children, of shape (ancestors, litter)), all litters being of one size."""
+    """(slots of the children, of shape (ancestors, offspring_count)), all litters being of one size."""
     origin = pool.origin.numpy()[: pool.counts[0]]
     assert len(np.unique(origin)) == len(origin)
     return np.argsort(origin % ancestors, kind="stable").reshape(ancestors, -1)
@@ -245,8 +246,10 @@ def test_children_stay_inside_the_walls_and_come_back_at_periodic_ones():
     """At least half a spacing above the floor when spawned, a quarter from other walls and when halved."""
     low = np.full((64, 3), 0.1 * D) - [0.05, 0.0, 0.0]
     low[32:] = [0.15 - 0.1 * D, 0.3 - 0.1 * D, 0.4 - 0.1 * D]
-    for model, floor, extra in (({**SPAWN, "margin": 0.6}, 0.6, {}),
-                                ({"ratio": 9.0}, 0.25, {"volume": np.full(64, 8 * D**3)})):  # fmt: skip
+    for model, floor, extra in (
+        ({**SPAWN, "margin": 0.6}, 0.6, {}),
+        ({"ratio": 9.0}, 0.25, {"volume": np.full(64, 8 * D**3)}),
+    ):
         grown, pool = growing(model, position=low, **extra)
         grown.advance(0.21, 0.001)
         position = pool.position.numpy()[: pool.counts[0]].astype(float) / D

@@ -1,106 +1,210 @@
 """Small experiments: kept, found again, and blamed one by one when a process dies."""
 
-import json
 import os
-import sys
+from io import StringIO
 
 import pytest
+from rich.console import Console
 
-from fluidbench.errors import Interrupted
-from fluidbench.offspring import search_path
-from fluidbench.store import Store, read_record
-from fluidbench.study import experiments
-from fluidbench.study.experiments import run_tasks
+from fluidbench.errors import Interrupted, UserError
+from fluidbench.method.target import HERE, Target
+from fluidbench.report.progress import Display
+from fluidbench.runs import execute as execution
+from fluidbench.runs import experiment as module
+from fluidbench.runs import process
+from fluidbench.runs.execute import Hooks, execute
+from fluidbench.runs.experiment import Experiment
+from fluidbench.runs.job import Job
+from fluidbench.runs.store import Store, read_record
 
-TARGET = {"device": "cpu", "backend": "warp", "threads": 1}
+from .made import BEAD, SILENT, change, finished
+
+DUTIES = """
+import os, signal
+
+def double(task):
+    if task["x"] < 0:
+        raise ValueError("bad")
+    if task["x"] == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"y": 2 * task["x"], "process": os.getpid()}
+
+def decline(task):
+    from fluidbench.errors import UserError
+    raise UserError("there is no\\nsuch thing")
+"""
 
 
-def task(x, **more):
-    return (f"t{x}", {"method": "mpm", "target": TARGET, "x": x} | more)
+@pytest.fixture(autouse=True)
+def duties(tmp_path, monkeypatch):
+    """A module of functions for experiments, where children find it as well."""
+    (tmp_path / "duties").mkdir()
+    (tmp_path / "duties" / "duties_of_tests.py").write_text(DUTIES)
+    monkeypatch.syspath_prepend(str(tmp_path / "duties"))
+
+
+def task(x, function="double", **more):
+    return Experiment(f"duties_of_tests:{function}", f"t{x}", "mpm", {"x": x} | more)
 
 
 @pytest.fixture
-def rounds(monkeypatch):
-    """Rounds of tasks as they are asked for, run here: those in `deadly` kill a process, and all that run with it."""
-    asked, deadly = [], set()
+def done(monkeypatch):
+    """Experiments as they are launched, done here; one whose function raises has crashed."""
+    asked = []
 
-    def round_(tasks, function, workers):
-        asked.append((sorted(t["x"] for t in tasks.values()), workers))
-        died = False
-        for i, t in reversed(tasks.items()):
-            died = died or t["x"] in deadly
-            yield i, None if died else function(t)
+    def launch(work, folder, progress=None, gpu=""):
+        asked.append(work.task["x"])
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            work.perform(folder, lambda _: None)
+        except ValueError as error:
+            return work.bury(folder, False, f"ValueError: {error}")
+        return work.recall(folder)[0]
 
-    monkeypatch.setattr(experiments, "_round", round_)
-    return asked, deadly
-
-
-def double(task):
-    return {"crash": "ValueError: bad"} if task["x"] < 0 else {"y": 2 * task["x"]}
+    monkeypatch.setattr(execution, "launch", launch)
+    return asked
 
 
-def test_results_come_in_order_and_are_kept(tmp_path, rounds):
-    asked, _ = rounds
-    told = []
+def values(results):
+    return [r.get("y", r.get("crash")) for r in results]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_results_come_in_order_and_are_kept(tmp_path, done, workers):
     tasks = [task(3), task(1), task(-1), task(2)]
-    results = run_tasks(tasks, double, Store(tmp_path), 2, lambda i, r: told.append((i, r)))
-    assert results == [{"y": 6}, {"y": 2}, {"crash": "ValueError: bad"}, {"y": 4}]
-    assert sorted(told, key=lambda row: row[0]) == list(enumerate(results)) and asked == [([-1, 1, 2, 3], 2)]
+    results = execute(tasks, Store(tmp_path), SILENT, workers)
+    assert values(results) == [6, 2, "ValueError: bad", 4] and sorted(done) == [-1, 1, 2, 3]
     kept = sorted(tmp_path.glob("runs/*/result.json"))
     assert len(kept) == 3 and read_record(kept[0].parent, "result.json")[0]["result"] in results
-    again = run_tasks(tasks, double, Store(tmp_path), 2, lambda i, r: None)
-    assert again == results and asked[1:] == [([-1], 2)]  # what crashed is tried again
+    again = execute(tasks, Store(tmp_path), SILENT, workers)
+    assert again == results and done[4:] == [-1]  # what crashed is tried again
     fresh = Store(tmp_path, fresh=True)
-    run_tasks(tasks[:2], double, fresh, 1, lambda *_: None)
-    run_tasks(tasks[:2], double, fresh, 1, lambda *_: None)
-    assert asked[2:] == [([1, 3], 1)]  # once, whatever was there before
+    execute(tasks[:2], fresh, SILENT)
+    execute(tasks[:2], fresh, SILENT)
+    assert done[5:] == [3, 1]  # once, whatever was there before
 
 
-def test_results_of_other_code_are_measured_again(tmp_path, rounds, monkeypatch):
-    asked, _ = rounds
-    run_tasks([task(1)], double, Store(tmp_path), 1, lambda *_: None)
-    monkeypatch.setattr(experiments, "code", lambda method, backend: {"sources": "edited"})
-    run_tasks([task(1)], double, Store(tmp_path), 1, lambda *_: None)
-    assert [row[0] for row in asked] == [[1], [1]]
-    run_tasks([task(1, more=2)], double, Store(tmp_path), 1, lambda *_: None)
+def test_results_of_other_code_are_measured_again(tmp_path, done, monkeypatch):
+    asked, notes = [], []
+    hooks = Hooks(*[lambda *_: None] * 3, notes.append)
+    execute([task(1)], Store(tmp_path), hooks)
+    real = module.code
+    monkeypatch.setattr(module, "code", lambda *given: asked.append(given) or {"sources": "edited"})
+    execute([task(1)], Store(tmp_path), hooks)
+    assert done == [1, 1] and set(asked) == {("mpm", "warp", ("study",))}
+    assert len(notes) == 1 and notes[0].endswith("is run again: the code, or Warp or Taichi, has changed since")
+    monkeypatch.setattr(module, "code", real)
+    execute([task(1, more=2)], Store(tmp_path), hooks)
     assert len(list(tmp_path.glob("runs/*/result.json"))) == 2
 
 
-def test_who_kills_a_process_is_found_and_the_others_are_run(tmp_path, rounds):
-    asked, deadly = rounds
-    deadly.add(4)
-    tasks = [task(x) for x in range(8)]
-    results = run_tasks(tasks, double, Store(tmp_path), 2, lambda *_: None)
-    assert results == [{"y": 2 * x} if x != 4 else {"crash": "its process died without a word"} for x in range(8)]
-    # all at once; then three of those that may have been it, alone; then the others together
-    assert [row for row in asked if len(row[0]) > 1] == [(list(range(8)), 2), ([0, 1], 2)]
-    assert sorted(row for row in asked if len(row[0]) == 1) == [([2], 1), ([3], 1), ([4], 1)]
+def test_an_experiment_knows_its_own_result(tmp_path):
+    own = task(1)
+    assert own.recall(tmp_path) == (None, "") and own.forestall(tmp_path) is None and own.limit is None
+    own.perform(tmp_path, lambda _: None)
+    assert own.recall(tmp_path) == ({"y": 2, "process": os.getpid()}, "")
+    assert task(1, more=2).recall(tmp_path)[0] is None and own.key != task(2).key
+    path = tmp_path / "result.json"
+    path.write_text(path.read_text().replace('"y": 2', '"y": 3'))
+    assert own.recall(tmp_path) == (None, "result.json is not as it was written")
+    path.write_text("{")
+    assert own.recall(tmp_path) == (None, "result.json cannot be read")
+    assert own.refuse(tmp_path, "no") == {"crash": "no"} == own.bury(tmp_path, True, "no")
+    assert own.name == "t1" and own.target == HERE and own.inputs() == {"x": 1}
+    with pytest.raises(UserError, match="there is no"):
+        task(1, "decline").perform(tmp_path, lambda _: None)
 
 
-def test_an_interruption_says_how_much_is_finished(tmp_path, rounds):
-    def stop(task):
-        if task["x"] == 1:
+def test_an_interruption_says_how_much_is_finished(tmp_path, monkeypatch):
+    def launch(work, folder, progress=None, gpu=""):
+        if work.task["x"] == 2:
             raise KeyboardInterrupt
         return {"y": 0}
 
-    with pytest.raises(Interrupted, match="2 of 4 experiments are finished"):
-        run_tasks([task(x) for x in range(4)], stop, Store(tmp_path), 1, lambda *_: None)
+    monkeypatch.setattr(execution, "launch", launch)
+    with pytest.raises(Interrupted, match="2 of 4 runs are finished"):
+        execute([task(x) for x in range(4)], Store(tmp_path), SILENT)
 
 
-def test_workers_inherit_a_clean_environment(monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", "/elsewhere")
-    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
-    with experiments._clean_environment():
-        assert "PYTHONPATH" not in os.environ and os.environ["PYTHONSAFEPATH"] == "1"
-    assert os.environ["PYTHONPATH"] == "/elsewhere" and "PYTHONSAFEPATH" not in os.environ
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    wanted = search_path()
-    experiments._begin(wanted)
-    assert sys.path == wanted
+def test_who_kills_a_process_is_found_and_the_others_are_run(tmp_path):
+    """Real children, each one's own: who is killed, raises or declines says so, and takes nobody along."""
+    results = execute([task(3), task(4), task(-1), task(5, "decline")], Store(tmp_path), SILENT, 2)
+    assert results[0]["y"] == 6 and results[0]["process"] != os.getpid()
+    assert results[1]["crash"].startswith("its process was killed (SIGKILL)")
+    assert results[2] == {"crash": "its process ended with code 1: ValueError: bad"}
+    assert list(results[3]) == ["crash"]
+    again = Store(tmp_path)
+    kept = [
+        t for t in (task(3), task(4), task(-1), task(5, "decline")) if t.recall(again.folder(t.name, t.inputs()))[0]
+    ]
+    assert kept == [task(3)]
+    assert not process._children
 
 
-def test_a_task_runs_in_a_process_of_its_own(tmp_path):
-    results = run_tasks(
-        [("a", {"method": "mpm", "target": TARGET, "s": "[1"})], json.loads, Store(tmp_path), 1, lambda *_: None
+# --- what is shown meanwhile
+
+
+PROGRESS = {"time": 0.5, "until": 1.0, "speed": 0.25}
+
+
+def display(planned, line=None, quiet=False, terminal=False):
+    console = Console(file=StringIO(), width=200, force_terminal=terminal)
+    return Display("title", planned, line, quiet, console), console.file
+
+
+def reused(i, time="now"):
+    run = change(finished("mpm", repeat=i), machine={"time": time})
+    object.__setattr__(run, "reused", True)
+    return run
+
+
+def show(shown, *results):
+    with shown as hooks:
+        for i, result in enumerate(results):
+            known = getattr(result, "reused", False)
+            hooks.started(i, shown.planned[i], known)
+            if not known:
+                hooks.progress(i, PROGRESS)
+            hooks.ended(i, result)
+        hooks.note("a note")
+
+
+JOBS = [Job(BEAD.model_dump(mode="json"), "mpm", Target(backend="taichi"), repeat=i) for i in range(5)]
+
+
+def test_lines_are_said_of_what_has_ended_and_nothing_where_there_is_nothing_to_say():
+    said = []
+    shown, text = display([*JOBS[:2], task(1)], lambda i, result: said.append((i, result)) or f"[line {i}]" * (i != 1))
+    results = finished(), finished(), {"y": 2}
+    show(shown, *results)
+    assert said == list(enumerate(results)) and shown.progress.tasks[0].completed == 3 and not shown.tasks
+    assert text.getvalue() == "[line 0]\n[line 2]\nfluidbench: a note\n"  # no bars where nobody looks
+
+
+def test_what_was_reused_is_named_or_counted():
+    shown, text = display(JOBS[:2])
+    show(shown, reused(0, "monday"), finished())
+    assert text.getvalue().splitlines()[-1] == (
+        "fluidbench: reused: mpm (monday); --fresh (fresh=True) runs them again"
     )
-    assert results[0]["crash"].startswith("TypeError: the JSON object must be str")
+    shown, text = display(JOBS)
+    show(shown, *[reused(i, f"2026-01-0{9 - i}") for i in range(5)])
+    assert "reused: 5 runs, the oldest of 2026-01-05; " in text.getvalue()
+
+
+def test_a_quiet_display_passes_notes_on_and_says_nothing_else():
+    shown, text = display(JOBS[:2], lambda i, result: "a line", quiet=True, terminal=True)
+    show(shown, reused(0), finished())
+    assert text.getvalue().replace("\x1b", "").strip() == "fluidbench: a note"
+
+
+def test_bars_are_drawn_in_a_terminal():
+    shown, text = display(JOBS[:1], terminal=True)
+    with shown as hooks:
+        hooks.started(0, JOBS[0], False)
+        hooks.progress(0, PROGRESS)
+        (bar,) = [t for t in shown.progress.tasks if t.id in shown.tasks.values()]
+        assert (bar.description, bar.completed) == ("  line_bead-mpm (taichi)", 50)
+        assert bar.fields["state"] == "t = 0.500 of 1 s, top speed 0.25 m/s"
+        hooks.ended(0, finished())
+    assert "title" in text.getvalue() and "1/1" in text.getvalue() and "mpm completed" in text.getvalue()

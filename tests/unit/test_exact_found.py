@@ -3,20 +3,19 @@
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.report import stability as stability_page
-from fluidbench.study import table2 as module
-from fluidbench.study.table2 import VARIANTS, table2
-from fluidbench.target import Target
+from fluidbench.paper import table2 as module
+from fluidbench.paper.table2 import VARIANTS, table2
+from fluidbench.study import stability_report as stability_page
 
 from ..conftest import scenario
-from .made import finished
+from .made import working
 
 
-def test_rows_of_the_tower_are_called_by_their_variant(monkeypatch):
+def test_rows_of_the_tower_are_called_by_their_variant(tmp_path, monkeypatch):
     """study/table2.py, table2(): the inner loop takes `variant` for the job's, so every row is called `pictures`, and
     no claim that compares variants is ever judged."""
-    monkeypatch.setattr(module, "execute", lambda planned, *_: [finished(j.method) for j in planned])
-    rows = table2(["mpm"], [None], 2, True, None, None, Target(), 9.0)
+    working(monkeypatch)
+    rows = table2(["mpm"], pools=[None], repeats=2, quick=True, out=tmp_path, progress=False).rows
     assert [r.variant for r in rows] == list(VARIANTS)
     assert len(module.claims(rows)) == 4
 

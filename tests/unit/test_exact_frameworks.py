@@ -1,24 +1,25 @@
 """Verdicts on cost in both frameworks, and the lengths and rows of a comparison."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.study.compare import binding, jobs, lengths_of, tidy
-from fluidbench.study.evidence import METHODS
-from fluidbench.study.frameworks import frameworks
-from fluidbench.study.verdicts import DIFFERS, HOLDS, OPEN
-from fluidbench.target import Target
+from fluidbench.measure.reference import Answer
+from fluidbench.method.target import Target
+from fluidbench.paper.evidence import METHODS
+from fluidbench.paper.frameworks import frameworks
+from fluidbench.paper.verdicts import DIFFERS, HOLDS, OPEN
+from fluidbench.study import compare_report
+from fluidbench.study.compare import jobs, lengths_of
 
-from .made import BEAD, case, evidence, finished, repeated, trial
+from .made import BEAD, case, change, evidence, finished, repeated, trial
 
 TAICHI = Target(backend="taichi")
 
 
 def both(here, there, trials=(), others=()):
-    made = {m: [replace(r, record=r.record | {"backend": "taichi"}) for r in rs] for m, rs in there.items()}
+    made = {m: [change(r, backend="taichi") for r in rs] for m, rs in there.items()}
     return frameworks(evidence(trials, repeats=here, other=made, other_trials=list(others)))
 
 
@@ -52,8 +53,12 @@ def test_every_place_of_cost_is_held_against_the_other_backend():
 
 def test_cost_at_equal_error_is_held_against_the_other_backend():
     def answers(*factors):
-        return [trial(case(n), m, e, wall=f * w) for n in ("dam_break", "bead_area")
-                for m, f in zip(METHODS, factors, strict=True) for e, w in ((0.4, 1.0), (0.1, 9.0))]  # fmt: skip
+        return [
+            trial(case(n), m, e, wall=f * w)
+            for n in ("dam_break", "bead_area")
+            for m, f in zip(METHODS, factors, strict=True)
+            for e, w in ((0.4, 1.0), (0.1, 9.0))
+        ]
 
     here = repeated(mpm=2.0, sph=9.0, pbd=1.0)
     cells = both(here, here, answers(2.0, 9.0, 1.0), answers(2.0, 9.0, 1.0))[5:8]
@@ -72,16 +77,25 @@ def test_cost_at_equal_error_is_held_against_the_other_backend():
 
 def test_lengths_are_what_a_printer_cares_about():
     measures = {
-        "bead_width_m": 1.0, "bead_height_m": 2.0, "bead_area_m2": 3.0, "slump": 4.0, "spread_radius_m": 5.0,
-        "front_x_m": 6.0, "height_m": 7.0, "layer_1_width_m": 8.0, "layer_2_height_m": 9.0, "layer_1_radius_m": 10.0,
-        "top_m": 11.0, "layer_1_continuity": 12.0, "layer_1_level_m": 13.0, "print_height_m": 14.0,
-    }  # fmt: skip
-    assert sorted(lengths_of({"measures": measures}).values()) == [float(i) for i in range(1, 11)]
-    assert lengths_of({"measures": {"slump": math.nan, "height_m": math.inf}}) == {} == lengths_of({})
-    assert (
-        binding({"binding_s": {"a": 1.0, "b": 3.0, "c": 2.0}}) == "b"
-        and binding({}) == binding({"binding_s": {}}) == ""
-    )
+        "bead_width_m": 1.0,
+        "bead_height_m": 2.0,
+        "bead_area_m2": 3.0,
+        "slump": 4.0,
+        "spread_radius_m": 5.0,
+        "front_x_m": 6.0,
+        "height_m": 7.0,
+        "layer_1_width_m": 8.0,
+        "layer_2_height_m": 9.0,
+        "layer_1_radius_m": 10.0,
+        "top_m": 11.0,
+        "layer_1_continuity": 12.0,
+        "layer_1_level_m": 13.0,
+        "print_height_m": 14.0,
+    }
+    assert sorted(lengths_of(finished(measures=measures).record).values()) == [float(i) for i in range(1, 11)]
+    nothing = {"slump": math.nan, "height_m": math.inf}
+    assert lengths_of(finished(measures=nothing).record) == {} == lengths_of(finished().record)
+    assert finished(binding_s={"a": 1.0, "b": 3.0, "c": 2.0}).record.binding == "b" and finished().record.binding == ""
 
 
 def test_a_comparison_is_every_method_backend_and_repeat_in_order():
@@ -94,10 +108,31 @@ def test_a_comparison_is_every_method_backend_and_repeat_in_order():
     assert all(j.keep_frames and j.scenario == BEAD.model_dump(mode="json") for j in made)
 
 
-def test_a_row_of_the_comparison_holds_what_the_record_holds():
-    run = finished("sph", measures={"top_m": 0.5}, answers=[{"quantity": "q", "error": 0.25}], binding_s={"a": 1.0},
-                   machine={"cores": "2"}, wall_s=7.0, seed=3, threads=1, print="sound")  # fmt: skip
-    row = tidy([run, finished()]).to_dict("records")[0]
-    expected = {"method": "sph", "top_m": 0.5, "error: q": 0.25, "binding_bound": "a", "machine_cores": "2",
-                "wall_s": 7.0, "seed": 3, "print": "sound", "reused": False, "verdict": "completed"}  # fmt: skip
+def test_a_row_of_the_comparison_holds_what_the_record_holds(tmp_path, monkeypatch):
+    monkeypatch.setattr(compare_report, "plots", lambda _: [])
+    run = finished(
+        "sph",
+        measures={"top_m": 0.5},
+        answers=[Answer("q", 1.0, 1.0, 0.25, "relative", "s")],
+        binding_s={"a": 1.0},
+        folder=tmp_path,
+        machine={"cores": "2"},
+        wall_s=7.0,
+        seed=3,
+        threads=1,
+        print="sound",
+    )
+    row = compare_report.report([run, finished(folder=tmp_path)], tmp_path, "compare").data.to_dict("records")[0]
+    expected = {
+        "method": "sph",
+        "top_m": 0.5,
+        "error: q": 0.25,
+        "binding_bound": "a",
+        "machine_cores": "2",
+        "wall_s": 7.0,
+        "seed": 3,
+        "print": "sound",
+        "reused": False,
+        "verdict": "completed",
+    }
     assert {key: row[key] for key in expected} == expected

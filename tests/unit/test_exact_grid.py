@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, SLIP, STICK, Scene
+from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Scene
 from solvers.mpm import grid as mpm_grid
 from solvers.mpm import kernels_warp as mpm
 from solvers.mpm import walls as mpm_walls
@@ -76,10 +76,12 @@ def test_velocities_seen_in_walls_and_rubbed_by_them():
     v = (1.0, 2.0, 4.0, 9.0)
     assert list(mpm_walls.flipped(wp.vec4(*v), 1, int(SLIP))) == [1.0, -2.0, 4.0, 9.0]
     assert list(mpm_walls.flipped(wp.vec4(*v), 1, int(STICK))) == [-1.0, -2.0, -4.0, 9.0]
-    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, -2.0), 2, -1.0, 0.5)) == pytest.approx([2.4, 3.2, 0.0])  # 5 - 0.5 x 2
-    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, -2.0), 2, -1.0, 3.0)) == [0.0, 0.0, 0.0]
-    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, 2.0), 2, -1.0, 0.5)) == [3.0, 4.0, 2.0]  # it may lift off
-    assert list(mpm_walls.rub(wp.vec3(3.0, 4.0, 2.0), 2, 1.0, 0.5)) == pytest.approx([2.4, 3.2, 0.0])
+    assert list(mpm_walls.wall_friction(wp.vec3(3.0, 4.0, -2.0), 2, -1.0, 0.5)) == pytest.approx(
+        [2.4, 3.2, 0.0]
+    )  # 5 - 0.5 x 2
+    assert list(mpm_walls.wall_friction(wp.vec3(3.0, 4.0, -2.0), 2, -1.0, 3.0)) == [0.0, 0.0, 0.0]
+    assert list(mpm_walls.wall_friction(wp.vec3(3.0, 4.0, 2.0), 2, -1.0, 0.5)) == [3.0, 4.0, 2.0]  # it may lift off
+    assert list(mpm_walls.wall_friction(wp.vec3(3.0, 4.0, 2.0), 2, 1.0, 0.5)) == pytest.approx([2.4, 3.2, 0.0])
     assert list(mpm_walls.unbound(wp.vec4(2.0, 4.0, 6.0, 2.0), wp.vec3(0.0, 0.0, -1.0), 5.0)) == [1.0, 2.0, 2.0, 5.0]
     assert list(mpm_walls.unbound(wp.vec4(2.0, 4.0, 6.0, 0.0), wp.vec3(0.0, 0.0, -1.0), 5.0)) == [0.0, 0.0, 0.0, 5.0]
 
@@ -89,10 +91,15 @@ def test_walls_act_on_nodes_on_and_behind_them_by_their_kind():
         x_lower="stick", y_lower="slip", y_upper={"friction": 0.25}, z_lower={"friction": 0.5}, z_upper="slip"
     )
     rows = {
-        (4, 8, 8): (0.0, 0.0, 0.0), (5, 8, 8): V, (8, 4, 8): (1.0, 0.0, 4.0), (8, 3, 8): (1.0, 0.0, 4.0),
-        (8, 8, 4): V, (8, 8, 14): (1.0, 2.0, 0.0), (14, 8, 8): (0.0, 2.0, 4.0),
+        (4, 8, 8): (0.0, 0.0, 0.0),
+        (5, 8, 8): V,
+        (8, 4, 8): (1.0, 0.0, 4.0),
+        (8, 3, 8): (1.0, 0.0, 4.0),
+        (8, 8, 4): V,
+        (8, 8, 14): (1.0, 2.0, 0.0),
+        (14, 8, 8): (0.0, 2.0, 4.0),
         (8, 14, 8): (1.0 * (1 - 0.5 / math.sqrt(17)), 0.0, 4.0 * (1 - 0.5 / math.sqrt(17))),
-    }  # fmt: skip
+    }
     for node, expected in rows.items():
         got = mpm_walls.wall_velocity(grid, wp.vec3i(*node), wp.vec3i(1, 1, 1), wp.vec3(*V))
         assert list(got) == pytest.approx(expected), node

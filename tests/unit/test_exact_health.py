@@ -6,25 +6,15 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.health import Health
-from fluidbench.particles import CARRIED, FAULT_ASTRAY, FAULT_STATE, FREE, Pool
-from fluidbench.scene import (
-    Scene,
-)
+from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.method.vitals import mass_energy
+from fluidbench.native.health import Health
+from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 
 from ..conftest import scenario
+from .made import place, pool_of
 
 wp.set_module_options({"enable_backward": False})
-
-
-def pool_of(*scenarios, capacity=40):
-    return Pool(Scene(list(scenarios) or scenario()), capacity)
-
-
-def place(pool, n=2, velocity=(0.0, 0.0, 0.0), volume=1e-6, birth=0.0):
-    x = np.full((n, 3), 0.1) + 0.01 * np.arange(n)[:, None]
-    pool.place(x, np.tile(velocity, (n, 1)), volume, int(FREE), np.arange(n) + 7, birth)
-    return x
 
 
 def watched(*scenarios, velocity=(0.0, 0.0, 0.0), n=2):
@@ -41,8 +31,11 @@ def fast():
 
 def test_energies_are_summed_over_particles_and_worlds():
     """Two particles of 1 g and of 3 g in worlds of g = 10 and 20 m/s^2, at 0.1 and 0.11 m, at 5 and 5 m/s."""
-    health, _ = watched(scenario(gravity=[0, 0, -10.0]), scenario(gravity=[0, 0, -20.0], material={"density": 3000.0}),
-                        velocity=(3.0, 0.0, 4.0))  # fmt: skip
+    health, _ = watched(
+        scenario(gravity=[0, 0, -10.0]),
+        scenario(gravity=[0, 0, -20.0], material={"density": 3000.0}),
+        velocity=(3.0, 0.0, 4.0),
+    )
     vital = health.read()
     assert vital.speed == pytest.approx(5.0)
     assert vital.kinetic == pytest.approx(0.5 * 25.0 * (2e-3 + 6e-3), rel=1e-5)
@@ -67,7 +60,7 @@ def test_speed_is_limited_to_three_times_sound_and_scenario(share, sound):
 
 
 def supply(health):
-    return health._mass_energy()
+    return mass_energy(health.scene.scenario, health.scene.top_wave_speed)
 
 
 def test_energy_that_a_scenario_can_supply():
@@ -114,9 +107,12 @@ def test_what_is_not_finite_is_counted_over_the_worlds():
 def test_fault_bits_are_words():
     health, pool = watched(fast())
     assert health.broken() is None and health.read().complaint is None
-    for bits, words in ((FAULT_STATE, "a particle's state is not finite, or beyond that of any matter"),
-                        (FAULT_ASTRAY, "a particle was thrown out of the domain, or faster than 306 m/s"),
-                        (int(FAULT_ASTRAY) | int(FAULT_STATE), "a particle was thrown"), (1, None)):  # fmt: skip
+    for bits, words in (
+        (FAULT_STATE, "a particle's state is not finite, or beyond that of any matter"),
+        (FAULT_ASTRAY, "a particle was thrown out of the domain, or faster than 306 m/s"),
+        (int(FAULT_ASTRAY) | int(FAULT_STATE), "a particle was thrown"),
+        (1, None),
+    ):
         pool.fault.fill_(int(bits))
         assert (health.broken() or "").startswith(words or "") and health.read().complaint == health.broken()
         assert (health.broken() is None) is (words is None)
@@ -164,8 +160,13 @@ def test_vectors_are_audited_in_every_component(component):
     for value, bits in ((0.99e18, 0), (-0.99e18, 0), (1.01e18, FAULT_STATE), (np.nan, FAULT_STATE)):
         assert audited("velocity", 65, value, component)[0] == bits
     reach = 0.08
-    for value, bits in ((-0.999 * reach, 0), (0.2 + 0.999 * reach, 0), (-1.01 * reach, FAULT_ASTRAY),
-                        (0.2 + 1.01 * reach, FAULT_ASTRAY), (np.nan, FAULT_ASTRAY)):  # fmt: skip
+    for value, bits in (
+        (-0.999 * reach, 0),
+        (0.2 + 0.999 * reach, 0),
+        (-1.01 * reach, FAULT_ASTRAY),
+        (0.2 + 1.01 * reach, FAULT_ASTRAY),
+        (np.nan, FAULT_ASTRAY),
+    ):
         found, after = audited("position", 65, value, component)
         assert found == bits
         if bits:

@@ -163,12 +163,17 @@ def test_what_position_based_sweeps_can_stand_for():
 @pytest.mark.parametrize(
     ("ratio", "share"),
     [
-        (0.8, 1.0), (1.0, 1.0), (1.2, 1.0 - 0.5 * 0.2 / (math.sqrt(2) - 1)), (math.sqrt(2), 0.5),
+        (0.8, 1.0),
+        (1.0, 1.0),
+        (1.2, 1.0 - 0.5 * 0.2 / (math.sqrt(2) - 1)),
+        (math.sqrt(2), 0.5),
         (1.45, 0.1875 + 0.3125 * (math.sqrt(3) - 1.45) / (math.sqrt(3) - math.sqrt(2))),
-        (1.6, 0.1875 + 0.3125 * (math.sqrt(3) - 1.6) / (math.sqrt(3) - math.sqrt(2))), (math.sqrt(3), 0.1875),
-        (1.8, 0.1875 - 0.3125 * (1.8 - math.sqrt(3)) / (math.sqrt(3) - math.sqrt(2))), (2.5, 0.05),
+        (1.6, 0.1875 + 0.3125 * (math.sqrt(3) - 1.6) / (math.sqrt(3) - math.sqrt(2))),
+        (math.sqrt(3), 0.1875),
+        (1.8, 0.1875 - 0.3125 * (1.8 - math.sqrt(3)) / (math.sqrt(3) - math.sqrt(2))),
+        (2.5, 0.05),
     ],
-)  # fmt: skip
+)
 def test_bonds_soften_linearly_with_their_length(ratio, share):
     """k = 8 E d / 15 times 1, 1/2, 3/16 at 1, sqrt 2, sqrt 3 spacings, linear in between, never below 1/20."""
     spacing = 0.01

@@ -2,9 +2,9 @@
 
 import pytest
 
-from fluidbench import library
 from fluidbench.errors import UserError, quoted, suggestion
-from fluidbench.library import assign, find, load, parse_override
+from fluidbench.scenario import library
+from fluidbench.scenario.library import assign, find, load, parse_override
 
 
 def test_a_file_is_found_by_name_or_path(tmp_path, monkeypatch):

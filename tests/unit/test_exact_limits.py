@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.extent import ADDRESSABLE, MOST_OUTPUTS, MOST_TICKS, RESOLVED
+from fluidbench.scenario.extent import ADDRESSABLE, MOST_OUTPUTS, MOST_TICKS, RESOLVED
 
 from ..conftest import bead, scenario
 
@@ -211,10 +211,15 @@ def test_unusual_sizes_and_speeds_are_warned_about():
 
     def paced(exit_speed=0.1, speed=0.1, gravity=-9.81):
         s = bead()
-        return warned(s.model_copy(update={
-            "nozzle": s.nozzle.model_copy(update={"exit_speed": exit_speed}), "gravity": (0.0, 0.0, gravity),
-            "toolpath": s.toolpath.model_copy(update={"speed": speed}),
-        }))  # fmt: skip
+        return warned(
+            s.model_copy(
+                update={
+                    "nozzle": s.nozzle.model_copy(update={"exit_speed": exit_speed}),
+                    "gravity": (0.0, 0.0, gravity),
+                    "toolpath": s.toolpath.model_copy(update={"speed": speed}),
+                }
+            )
+        )
 
     for key in ("exit_speed", "speed"):
         name = {"exit_speed": "nozzle speed", "speed": "toolpath.speed"}[key]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fluidbench.body import Body, Wave
-from fluidbench.collider import Collider, Part
-from fluidbench.cure import Cure
-from fluidbench.expansion import Expansion
-from fluidbench.material import Material
+from fluidbench.scenario.body import Body, Wave
+from fluidbench.scenario.collider import Collider, Part
+from fluidbench.scenario.cure import Cure
+from fluidbench.scenario.expansion import Expansion
+from fluidbench.scenario.material import Material
 
 RHO = 800.0
 
@@ -58,10 +58,11 @@ def test_whether_it_is_elastic_and_whether_it_changes():
 
 def test_material_at_a_degree_a_level_and_an_age():
     foam = material(
-        youngs_modulus=1e3, viscosity=2.0,
+        youngs_modulus=1e3,
+        viscosity=2.0,
         cure=Cure(kind="stages", delay=2.0, jitter=0.5, time=4.0, stages=4, youngs_modulus=9e3, viscosity=10.0),
         expansion=Expansion(kind="spawn", ratio=4.0, passes=2, delay=1.0, jitter=0.25, interval=1.0),
-    )  # fmt: skip
+    )
     assert (foam.at().density, foam.at().youngs_modulus, foam.at().viscosity) == (RHO, 1e3, 2.0)
     half = foam.at(0.5, 4.0)
     assert (half.density, half.youngs_modulus, half.viscosity) == pytest.approx((RHO / 4.0, 5e3, 6.0))

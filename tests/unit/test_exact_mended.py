@@ -24,7 +24,7 @@ def test_the_front_of_a_square_column_is_compared_with_its_own_table():
 
 @pytest.mark.parametrize("ticks", [3.0, 8.0])
 def test_foam_that_has_nearly_grown_does_not_shrink_in_a_tick_of_several_time_constants(ticks):
-    """Seven time constants after the onset; process/expansion.quicken expands 1 - exp(-step) in step, not small.
+    """Seven time constants after the onset; process/expansion.growth_rates expands 1 - exp(-step) in step, not small.
     The volume falls by 2 % in a tick of 8 time constants."""
     time = 1e-3
     grown, pool = growing({"ratio": 30.0, "time": time}, birth_time=np.full(64, -7.0 * time, np.float32))

@@ -2,17 +2,18 @@
 
 import itertools
 import math
-from types import SimpleNamespace
 
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.solver import get_solver
+from fluidbench.method.contract import Steps
+from fluidbench.method.target import Target
+from fluidbench.method.vitals import Vital
+from fluidbench.registry import get_method
 from fluidbench.study import limits, stability
 from fluidbench.study.limits import Limit, default_dt
 from fluidbench.study.stability import (
     AXES,
-    BARE,
     BLOCKS,
     block_material,
     block_tasks,
@@ -23,13 +24,11 @@ from fluidbench.study.stability import (
     measure_point,
     measure_points,
     point_tasks,
-    theory,
     varied,
 )
-from fluidbench.target import Target
 
 from ..conftest import bead, scenario
-from .made import BEAD
+from .made import BEAD, working
 
 WATER = {"density": 1000.0, "sound_speed": 10.0}
 
@@ -37,21 +36,25 @@ WATER = {"density": 1000.0, "sound_speed": 10.0}
 def test_axes_set_their_keys():
     assert AXES["viscosity"].setting(BEAD, 3.0) == {"material.viscosity": 3.0}
     assert AXES["spacing"].setting(BEAD, 2.0) == {"spacing": 3e-3}
-    assert AXES["particles_per_cell"].setting(BEAD, 8) == {"numerics.mpm.grid_ratio": pytest.approx(2.0)}
-    assert list(choose([])) == list(AXES) and list(choose(["density"])) == ["density"]
-    for axis in AXES.values():
+    own = choose(["particles_per_cell"], ["sph", "mpm"])["particles_per_cell"]
+    assert own.setting(BEAD, 8) == {"numerics.mpm.grid_ratio": pytest.approx(2.0)} and own.method == "mpm"
+    assert list(choose([], ["mpm", "sph"])) == [*AXES, "particles_per_cell"]
+    assert list(choose([], ["sph", "pbd"])) == list(AXES) and list(choose(["density"], ["mpm"])) == ["density"]
+    with pytest.raises(UserError, match="no axis 'particles_per_cell'"):
+        choose(["particles_per_cell"], ["sph", "pbd"])
+    for axis in choose([], ["mpm"]).values():
         assert list(axis.values) == sorted(set(axis.values)) and set(axis.quick) <= set(axis.values)
         assert (axis.quick[0], axis.quick[-1]) == (axis.values[0], axis.values[-1])
 
 
 def test_tasks_are_every_axis_method_and_value():
-    tasks = point_tasks(BEAD, choose(["density", "particles_per_cell"]), ["mpm", "sph"], True, Target())
+    tasks = point_tasks(BEAD, choose(["density", "particles_per_cell"], ["mpm", "sph"]), ["mpm", "sph"], True, Target())
     assert [(label, t["value"]) for label, t in tasks] == [
         *[(f"density-{m}", v) for m in ("mpm", "sph") for v in (10.0, 1e3, 1e4)],
         *[("particles_per_cell-mpm", v) for v in (1, 8, 27)],
     ]
     assert tasks[0][1]["settings"] == {"material.density": 10.0} and tasks[0][1]["quick"] is True
-    assert len(point_tasks(BEAD, choose(["density"]), ["pbd"], False, Target())) == 5
+    assert len(point_tasks(BEAD, choose(["density"], ["pbd"]), ["pbd"], False, Target())) == 5
     made = block_tasks(["mpm", "sph", "pbd"], True, Target())
     assert [label for label, _ in made] == [f"block-{k}-{m}" for m in ("mpm", "sph") for k in BLOCKS]
     assert {t["precision"] for _, t in made} == {0.1} and block_tasks(["mpm"], False, Target())[0][1][
@@ -65,7 +68,7 @@ def test_axes_go_by_decades_or_halves_of_them():
         values = [v for v in AXES[name].values if v > 0]
         steps = {round(b / a, 2) for a, b in itertools.pairwise(values)}
         assert steps <= {10.0, 100.0, 3.0, 3.33} and values[0] == pytest.approx(10 ** round(math.log10(values[0])))
-    counts = AXES["particles_per_cell"].values
+    counts = choose(["particles_per_cell"], ["mpm"])["particles_per_cell"].values
     assert counts[0] == 1 and counts[-1] == 27 and [b / a for a, b in itertools.pairwise(counts[:4])] == [2.0] * 3
     assert AXES["spacing"].values == pytest.approx((1 / 3, 1 / 2, 1, 2, 8 / 3))
     assert AXES["poisson_ratio"].values == (0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499)
@@ -74,30 +77,29 @@ def test_axes_go_by_decades_or_halves_of_them():
 @pytest.mark.parametrize(
     ("ticks", "each", "trouble_at", "looked"), [(9, 1, None, 9), (9, 1999, None, 2), (9, 1000, None, 2), (9, 1, 3, 3)]
 )
-@pytest.mark.parametrize("kind", ["complaint", "fault"])
+@pytest.mark.parametrize("kind", ["complaint", "shortage"])
 def test_the_opening_is_two_thousand_substeps_or_all(monkeypatch, ticks, each, trouble_at, looked, kind):
+    s = scenario(duration=0.1 * ticks, tick=0.1, output_interval=0.1)
+    assert s.schedule[:2] == (pytest.approx(0.1), ticks)
+
     class Opened:
-        def __init__(self, *_):
-            self.done, self.ticks, self.looks = 0, ticks, 0
+        def __init__(self, opened, config, target):
+            assert (opened, config, target) == (s, get_method("mpm").Config(), Target())
+            self.now, self.done, self.looks = 0.0, 0, 0
             made.append(self)
 
-        def advance(self):
-            self.done += 1
-            return SimpleNamespace(substeps=each)
-
-        def said(self, name):
-            return "boom" if name == kind and self.looks == trouble_at else None
+        def advance(self, until):
+            assert until == pytest.approx(self.now + s.schedule[0])
+            self.now, self.done = until, self.done + 1
+            return Steps(substeps=each)
 
         def look(self):
             self.looks += 1
-            return SimpleNamespace(complaint=self.said("complaint"))
-
-        def fault(self):
-            return self.said("fault")
+            return Vital(1.0, 1.0, 0.0, **{"complaint": None, kind: "boom" if self.looks == trouble_at else None})
 
     made = []
-    monkeypatch.setattr("fluidbench.simulation.Simulation", Opened)
-    assert stability.opening(BEAD, "mpm", Target()) == ("boom" if trouble_at else None)
+    monkeypatch.setattr(get_method("mpm"), "start", Opened)
+    assert stability.opening(s, "mpm", Target()) == ("boom" if trouble_at else None)
     assert made[0].looks == looked == made[0].done
 
 
@@ -114,9 +116,14 @@ def test_a_varied_scenario_changes_only_its_keys():
 
 def test_a_block_of_the_scenarios_material_does_not_yield():
     assert block_material(bead()) == {
-        "density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "viscosity": 0.0, "plastic_viscosity": 0.0,
-        "flow_index": 1.0, "equation_of_state": "linear",
-    }  # fmt: skip
+        "density": 1000.0,
+        "youngs_modulus": 6e3,
+        "poisson_ratio": 0.45,
+        "viscosity": 0.0,
+        "plastic_viscosity": 0.0,
+        "flow_index": 1.0,
+        "equation_of_state": "linear",
+    }
     water = scenario()
     assert block_material(water)["sound_speed"] == water.liquid_sound_speed
     assert "sound_speed" not in block_material(scenario(material={"density": 1.0, "bulk_modulus": 3.0}))
@@ -141,7 +148,7 @@ def point(monkeypatch, method="mpm", quick=True, survive=lambda dt: None, block_
     monkeypatch.setattr(limits, "block_limit", block_limit)
     monkeypatch.setattr(limits, "default_dt", lambda *_: (own, "acoustic"))
     monkeypatch.setattr(stability, "opening", lambda *_: opening)
-    task = point_tasks(BEAD, choose(["density"]), [method], quick, Target())[1][1]
+    task = point_tasks(BEAD, choose(["density"], [method]), [method], quick, Target())[1][1]
     return measure_point(task), tried, asked
 
 
@@ -153,7 +160,9 @@ def test_a_point_is_bracketed_around_the_methods_own_step(monkeypatch):
     assert row["dt_block_s"] == 0.5 and asked[0][1:] == (1.0, 0.2) and asked[0][0].spacing == BEAD.spacing
     assert asked[0][0].numerics == BEAD.numerics and asked[0][0].material.yield_stress is None
     assert tried[:2] == [1.0, 1.0] and max(tried) <= 8.0
-    assert row["dt_theory_s"] == pytest.approx(theory("mpm", BEAD, get_solver("mpm").Config(**BEAD.numerics["mpm"])))
+    assert row["dt_theory_s"] == pytest.approx(
+        get_method("mpm").theory(BEAD, get_method("mpm").Config(**BEAD.numerics["mpm"]))
+    )
     beyond, tried, _ = point(monkeypatch)
     assert beyond["lump_limit_found"] is False and beyond["dt_lump_s"] == pytest.approx(1.5**5) and len(tried) == 7
 
@@ -177,27 +186,51 @@ def test_pbd_is_tried_at_eight_steps_once(monkeypatch):
 
 
 def test_a_point_that_makes_no_scenario_or_is_refused_says_so():
-    task = point_tasks(scenario(), choose(["exit_speed"]), ["mpm"], True, Target())[0][1]
+    task = point_tasks(scenario(), choose(["exit_speed"], ["mpm"]), ["mpm"], True, Target())[0][1]
     assert measure_point(task)["reason"] == "nozzle.exit_speed: the scenario has no nozzle"
     assert measure_point(task)["verdict"] == "refused"
 
 
-def test_crashes_are_rows_with_their_reason(monkeypatch):
+def test_crashes_are_rows_with_their_reason():
     results = [{"crash": "it died"}, {"axis": "density", "value": 1.0}]
-    seen = []
+    asked = []
 
-    def run_tasks(tasks, function, store, workers, done):
-        for i, r in enumerate(results):
-            done(i, r)
+    def run(work):
+        asked.append(list(work))
         return results
 
-    monkeypatch.setattr(stability, "run_tasks", run_tasks)
-    tasks = point_tasks(BEAD, choose(["density"]), ["mpm"], True, Target())[:2]
-    rows = measure_points(tasks, None, 1, lambda i, r: seen.append(r["value"]))
+    tasks = point_tasks(BEAD, choose(["density"], ["mpm"]), ["mpm"], True, Target())[:2]
+    rows = measure_points(tasks, run)
     assert rows[0] == {"axis": "density", "value": 10.0, "method": "mpm", "verdict": "error", "reason": "it died"}
-    assert rows[1] == results[1] and seen == [10.0, 1.0]
-    blocks = measure_blocks(block_tasks(["mpm"], True, Target())[:2], None, 1, lambda *_: None)
-    assert blocks == [{"kind": "acoustic", "method": "mpm", "reason": "it died"}, results[1]]
+    assert rows[1] == results[1]
+    blocks = block_tasks(["mpm"], True, Target())[:2]
+    assert measure_blocks(blocks, run) == [{"kind": "acoustic", "method": "mpm", "reason": "it died"}, results[1]]
+    for (function, given), work in zip((("measure_point", tasks), ("measure_block", blocks)), asked, strict=True):
+        assert [(w.label, w.task) for w in work] == given and {w.target for w in work} == {Target()}
+        assert {(w.function, w.method) for w in work} == {(f"fluidbench.study.stability:{function}", "mpm")}
+
+
+@pytest.mark.parametrize(
+    ("verdict", "block", "fine"),
+    [
+        ("held", {}, True),
+        ("refused", {}, True),
+        ("failed", {}, False),
+        ("error", {}, False),
+        ("held", {"reason": "it died"}, False),
+    ],
+)
+def test_a_study_of_stability_ends_well_when_all_holds_or_is_refused(tmp_path, monkeypatch, verdict, block, fine):
+    def answer(work):
+        if "kind" in work.task:
+            whole = block or {"dt_limit_s": 1.0, "dt_own_s": 1.0, "dt_theory_s": 1.0}
+            return {"kind": work.task["kind"], "method": work.method, **whole}
+        return {"axis": work.task["axis"], "value": work.task["value"], "method": work.method, "verdict": verdict}
+
+    calls = working(monkeypatch, answer)
+    made = stability.stability(BEAD, ["mpm"], axes=["density"], quick=True, out=tmp_path, progress=False)
+    assert made.ok is fine and (len(made.points), len(made.blocks), len(made.table)) == (3, 3, 6)
+    assert [(len(call), call.workers) for call in calls] == [(3, 2), (3, 2)] and made.runs == []
 
 
 def test_a_block_is_measured_bare(monkeypatch):
@@ -210,19 +243,23 @@ def test_a_block_is_measured_bare(monkeypatch):
     monkeypatch.setattr(limits, "block_limit", block_limit)
     for label, task in block_tasks(["mpm", "sph"], True, Target()):
         row, (s, config, own, precision) = measure_block(task), asked[-1]
-        solver = get_solver(task["method"])
-        assert config == solver.Config(**BARE.get(task["method"], {})) and (s.spacing, precision) == (0.01, 0.1), label
+        solver = get_method(task["method"])
+        assert config == solver.Config(**get_method(task["method"]).bare) and (s.spacing, precision) == (0.01, 0.1), (
+            label
+        )
         assert row["dt_limit_s"] == pytest.approx(0.06) and row["dt_own_s"] == own == default_dt(s, solver, config)[0]
-        assert row["dt_theory_s"] == theory(task["method"], s, config) and row["kind"] == task["kind"]
+        assert row["dt_theory_s"] == get_method(task["method"]).theory(s, config) and row["kind"] == task["kind"]
 
 
 def test_findings_count_and_compare():
-    blocks = [{"kind": "acoustic", "method": "mpm", "dt_limit_s": 3.0, "dt_theory_s": 4.0, "dt_own_s": 1.5},
-              {"kind": "viscous", "method": "sph", "reason": "it died"}]  # fmt: skip
+    blocks = [
+        {"kind": "acoustic", "method": "mpm", "dt_limit_s": 3.0, "dt_theory_s": 4.0, "dt_own_s": 1.5},
+        {"kind": "viscous", "method": "sph", "reason": "it died"},
+    ]
     points = [
         {"axis": "density", "method": "mpm", "value": v, "verdict": w, "reason": r, "dt_own_s": dt, "binding": "b"}
         for v, w, r, dt in ((1.0, "held", "", 4.0), (2.0, "failed", "boom", 1.0), (3.0, "held", "", 2.0))
-    ]  # fmt: skip
+    ]
     points += [
         {"axis": "spacing", "method": "sph", "value": 1.0, "verdict": "refused", "reason": "no"},
         {"axis": "spacing", "method": "mpm", "value": 1.0, "verdict": "held", "reason": "", "dt_own_s": 3.0},

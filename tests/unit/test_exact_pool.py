@@ -5,28 +5,23 @@ import pytest
 import warp as wp
 
 from fluidbench.errors import UserError
-from fluidbench.extent import ADDRESSABLE
-from fluidbench.particles import CORE, FREE, MOST, OutOfCapacity, Pool, whole_warps
-from fluidbench.scene import (
-    Scene,
-)
+from fluidbench.native.pool import CORE, MOST, OutOfCapacity, Pool, whole_warps
+from fluidbench.native.scene import Scene
+from fluidbench.scenario.extent import ADDRESSABLE
 
 from ..conftest import scenario
+from .made import place, pool_of
 
 wp.set_module_options({"enable_backward": False})
 
-PASTE = {"density": 1000.0, "youngs_modulus": 2.6e4, "yield_stress": 50.0, "plastic_viscosity": 3.0, "flow_index": 0.5,
-         "viscosity": 0.25}  # fmt: skip
-
-
-def pool_of(*scenarios, capacity=40):
-    return Pool(Scene(list(scenarios) or scenario()), capacity)
-
-
-def place(pool, n=2, velocity=(0.0, 0.0, 0.0), volume=1e-6, birth=0.0):
-    x = np.full((n, 3), 0.1) + 0.01 * np.arange(n)[:, None]
-    pool.place(x, np.tile(velocity, (n, 1)), volume, int(FREE), np.arange(n) + 7, birth)
-    return x
+PASTE = {
+    "density": 1000.0,
+    "youngs_modulus": 2.6e4,
+    "yield_stress": 50.0,
+    "plastic_viscosity": 3.0,
+    "flow_index": 0.5,
+    "viscosity": 0.25,
+}
 
 
 def test_capacity_comes_in_whole_warps():

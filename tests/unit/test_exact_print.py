@@ -9,39 +9,19 @@ import pytest
 from fluidbench.measure import tower
 from fluidbench.measure.deposit import Deposit
 from fluidbench.measure.tower import Print, family_spread, progress, success, verdict_of
-from fluidbench.particles import CARRIED, CLAMPED, FREE
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 
-from ..conftest import scenario
-
-DIAMETER, RISE, D = 0.0128, 0.009, 1.5e-3
-RATE = 0.1 * math.pi * DIAMETER**2 / 4  # at 0.1 m/s
-PASTE = {"density": 1000.0, "youngs_modulus": 2e4, "yield_stress": 200.0}
-
-DIAMETER, RISE, D = 0.0128, 0.009, 1.5e-3
-RATE = 0.1 * math.pi * DIAMETER**2 / 4  # at 0.1 m/s
-PASTE = {"density": 1000.0, "youngs_modulus": 2e4, "yield_stress": 200.0}
-
-
-def tower_of(toolpath, material=PASTE, spacing=D, **more):
-    base = {"speed": 0.1, "layers": 3, "layer_height": RISE, "pause": 0.1}
-    return scenario(
-        domain={"lower": [-0.6, -0.6, -0.01], "upper": [1.6, 0.6, 0.06]}, bodies=[], material=material,
-        nozzle={"diameter": DIAMETER, "exit_speed": 0.1, "standoff": 0.01}, toolpath={**base, **toolpath},
-        spacing=spacing, duration=20.0, **more,
-    )  # fmt: skip
-
-
-def wall(length=0.2, **more):
-    return tower_of({"kind": "wall", "start": [0.0, 0.0], "end": [length, 0.0]}, **more)
-
-
-RING = tower_of({"kind": "ring", "center": [0.1, -0.2], "radius": 0.05})
+from .made import PASTE, RING, D, wall
 
 
 def frame(position, birth, mass=1.0, held=FREE, **more):
     n = len(position)
-    columns = {"position": np.array(position, float), "mass": np.broadcast_to(mass, n).astype(float),
-               "birth_time": np.broadcast_to(birth, n).astype(float), "held": np.broadcast_to(held, n)}  # fmt: skip
+    columns = {
+        "position": np.array(position, float),
+        "mass": np.broadcast_to(mass, n).astype(float),
+        "birth_time": np.broadcast_to(birth, n).astype(float),
+        "held": np.broadcast_to(held, n),
+    }
     return columns | {key: np.broadcast_to(value, n).astype(float) for key, value in more.items()}
 
 
@@ -108,8 +88,14 @@ def test_a_path_stands_from_three_quarters_of_the_plan(cells, stands):
 def test_progress_is_of_mass_outside_the_nozzle():
     cure = {"kind": "linear", "time": 1.0, "youngs_modulus": 1e5}
     s = wall(material={**PASTE, "cure": cure, "expansion": {"ratio": 4.0}})
-    made = frame(np.zeros((4, 3)), 0.0, [1.0, 4.0, 1.0, 6.0], [FREE, CLAMPED, FREE, CARRIED],
-                 phase=[95, 94, 100, 0], volume=[2e-3, 2e-3, 4e-3, 9.0])  # fmt: skip
+    made = frame(
+        np.zeros((4, 3)),
+        0.0,
+        [1.0, 4.0, 1.0, 6.0],
+        [FREE, CLAMPED, FREE, CARRIED],
+        phase=[95, 94, 100, 0],
+        volume=[2e-3, 2e-3, 4e-3, 9.0],
+    )
     assert progress(made, s) == pytest.approx(
         {"mean_cure": (95 + 376 + 100) / 600, "cured_share": 1 / 3, "volume_growth": 8e-3 * 1000.0 / 6.0}
     )
@@ -139,12 +125,12 @@ def judged(made=None, after=(1.0, 1.0), end=20.0, **changes):
     times = [0.0, *np.linspace(s.track.end, end, len(after))] if end > s.track.end else [0.0, end]
     heights = [9.0, *after] if end > s.track.end else [9.0, 1.0]
     criteria = success(s, measures, pd.DataFrame({"time_s": times, "print_height_m": heights}))
-    return verdict_of(criteria), {c["name"]: c for c in criteria}
+    return verdict_of(criteria), {c.name: c for c in criteria}
 
 
 def failed(**changes):
     verdict, criteria = judged(**changes)
-    return verdict, [name for name, c in criteria.items() if not c["met"]]
+    return verdict, [name for name, c in criteria.items() if not c.met]
 
 
 HEIGHT, STANDS, LAID = "height over plan", "share of the path that stands", "layers laid"
@@ -187,13 +173,17 @@ def test_every_condition_alone_and_the_worst_is_the_verdict(changes, verdict, un
 
 def test_criteria_say_what_was_measured_and_what_is_wanted():
     _, criteria = judged(print_height_m=0.0135, print_standing=0.5, layer_2_continuity=0.7, after=(2.0, 1.6))
-    assert {name: (pytest.approx(c["measured"]), c["wanted"]) for name, c in criteria.items()} == {
-        LAID: (3, "3"), "path travelled": (1.0, "1"), HEIGHT: (0.5, "1 ± 0.25"), STANDS: (0.5, ">= 0.95"),
-        "continuity of the worst layer": (0.7, ">= 0.95"), "sunk after the last layer": (0.2, "<= 0.05"),
-    }  # fmt: skip
-    assert judged(end=3.1)[1]["path travelled"]["measured"] == pytest.approx(0.5)
+    assert {name: (pytest.approx(c.measured), c.wanted) for name, c in criteria.items()} == {
+        LAID: (3, "3"),
+        "path travelled": (1.0, "1"),
+        HEIGHT: (0.5, "1 ± 0.25"),
+        STANDS: (0.5, ">= 0.95"),
+        "continuity of the worst layer": (0.7, ">= 0.95"),
+        "sunk after the last layer": (0.2, "<= 0.05"),
+    }
+    assert judged(end=3.1)[1]["path travelled"].measured == pytest.approx(0.5)
     none = judged(**{f"layer_{k}_level_m": None for k in (1, 2, 3)})[1]
-    assert none["continuity of the worst layer"]["measured"] == 0.0
+    assert none["continuity of the worst layer"].measured == 0.0
 
 
 @pytest.mark.parametrize(("radius", "met"), [(0.0549, True), (0.0551, False), (0.0451, True), (0.0449, False)])
@@ -201,12 +191,12 @@ def test_a_ring_keeps_its_radius_to_a_tenth(radius, met):
     rings = dict.fromkeys(("layer_1_radius_m", "layer_3_radius_m"), 0.05) | {"layer_2_radius_m": radius}
     verdict, criteria = judged(RING, **rings)
     criterion = criteria["worst radius error"]
-    assert (criterion["met"], criterion["wanted"]) == (met, "<= 0.1")
-    assert criterion["measured"] == pytest.approx(abs(radius / 0.05 - 1))
+    assert (criterion.met, criterion.wanted) == (met, "<= 0.1")
+    assert criterion.measured == pytest.approx(abs(radius / 0.05 - 1))
     assert verdict is (Print.SOUND if met else Print.DEFORMED)
     assert "worst radius error" not in judged()[1]
     none = judged(RING, **{f"layer_{k}_level_m": None for k in (1, 2, 3)})[1]["worst radius error"]
-    assert (none["measured"], none["met"]) == (1.0, False)
+    assert (none.measured, none.met) == (1.0, False)
 
 
 def test_verdicts_are_ordered_from_the_worst():

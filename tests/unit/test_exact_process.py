@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.layout import capacity_of
-from fluidbench.particles import CARRIED, CLAMPED, FREE, OutOfCapacity, Pool
-from fluidbench.process.chance import Chance, chance_of, direction, uniform
-from fluidbench.process.curing import Curing
-from fluidbench.process.emission import Emission
-from fluidbench.process.laying import Laying
-from fluidbench.process.stream import Stream
-from fluidbench.scene import Scene
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.pool import OutOfCapacity, Pool
+from fluidbench.native.process.chance import Chance, chance_of, direction, uniform
+from fluidbench.native.process.curing import Curing
+from fluidbench.native.process.emission import Emission
+from fluidbench.native.process.placement import Placement
+from fluidbench.native.scene import Scene
+from fluidbench.scenario.layout import capacity_of
+from fluidbench.scenario.stream import Stream
 
 from ..conftest import bead, scenario
 
@@ -26,7 +27,7 @@ def fed(*densities, **more):
     made = [bead(duration=0.5, bodies=[BLOCK], material={"density": rho}, **more) for rho in densities]
     scene = Scene(made)
     pool = Pool(scene, capacity_of(made[0]))
-    Laying(made[0], pool)
+    Placement(made[0], pool)
     return pool, Emission(scene, pool), Stream(made[0])
 
 
@@ -58,8 +59,9 @@ def test_discs_leave_at_their_time_and_have_flown_since():
     assert list(frame["held"]) == [int(FREE)] * 2 * n + [int(CARRIED)] * (len(frame["held"]) - 2 * n)
     for disc, (left, late) in enumerate([(0.001, 0.0205), (0.003, 0.0005)]):
         part = slice(disc * n, (disc + 1) * n)
-        place = np.column_stack([left + 0.1 * late + stream.offsets[:, 0], stream.offsets[:, 1],
-                                 np.full(n, 0.01 - 0.1 * late)])  # fmt: skip
+        place = np.column_stack(
+            [left + 0.1 * late + stream.offsets[:, 0], stream.offsets[:, 1], np.full(n, 0.01 - 0.1 * late)]
+        )
         assert frame["position"][part] == pytest.approx(place, abs=1e-8)
         assert frame["velocity"][part] == pytest.approx(np.tile([0.1, 0.0, -0.1], (n, 1)), abs=1e-6)
     block = pool.snapshot()
@@ -100,7 +102,7 @@ def test_every_disc_comes_once_and_solvers_hear_of_it():
 def test_a_disc_that_finds_no_room_ends_the_run():
     made = bead(duration=0.5, bodies=[BLOCK])
     pool = Pool(Scene(made), 96)
-    Laying(made, pool)
+    Placement(made, pool)
     with pytest.raises(OutOfCapacity, match="holds 96 particles a world and"):
         Emission(pool.scene, pool).advance(0.0, 0.004)
 
@@ -130,7 +132,7 @@ def test_laying_goes_on_from_where_another_one_came_to():
     bodies = [{**BLOCK, "start": start} for start in (0.0, 0.1, 0.2)]
     s = bead(bodies=bodies, duration=0.5)
     pools = [Pool(Scene(s), capacity_of(s)) for _ in range(2)]
-    first, second = (Laying(s, pool) for pool in pools)
+    first, second = (Placement(s, pool) for pool in pools)
     first.advance(0.15)
     assert first.progress() == [1, 128 + Stream(s).particles]
     copied(*pools)
@@ -149,7 +151,7 @@ def test_bodies_are_laid_at_their_start_in_order_after_the_stream():
     bodies = [box(0.03, 0.2, velocity=[1, 2, 3]), box(0.02, 0.0), box(0.01, 0.04, clamped=True)]
     s = bead(bodies=bodies, duration=0.5)
     pool = Pool(Scene(s), capacity_of(s))
-    laying, fed = Laying(s, pool), Stream(s).particles
+    laying, fed = Placement(s, pool), Stream(s).particles
     counts = pool.counts.copy()
     for now in (0.0, 0.0399, 0.04, 0.15, 0.2 - 1e-11, 0.3):  # rounding lays nothing a tick late
         laying.advance(now)
@@ -168,14 +170,18 @@ def test_without_a_nozzle_bodies_are_numbered_throughout():
     cube = {"kind": "box", "center": [0.05] * 3, "size": [0.02] * 3}
     s = scenario(bodies=[{**cube, "start": 0.005}, cube])
     pool = Pool(Scene(s), capacity_of(s))
-    Laying(s, pool).advance(0.005)
+    Placement(s, pool).advance(0.005)
     assert list(pool.snapshot()["origin"]) == list(range(16))
 
 
 KINDS = {
-    "jump": {}, "stages": {"time": 2.0, "stages": 5}, "linear": {"time": 2.0}, "first_order": {"rate": 1.0},
-    "kamal_sourour": {"rate": 0.1, "rate_autocatalytic": 2.0}, "avrami": {"rate": 0.5, "exponent": 2.5},
-}  # fmt: skip
+    "jump": {},
+    "stages": {"time": 2.0, "stages": 5},
+    "linear": {"time": 2.0},
+    "first_order": {"rate": 1.0},
+    "kamal_sourour": {"rate": 0.1, "rate_autocatalytic": 2.0},
+    "avrami": {"rate": 0.5, "exponent": 2.5},
+}
 
 
 def curing(now, births, held=None, phase=None, jitter=0.0, seed=0, **cure):
@@ -187,7 +193,7 @@ def curing(now, births, held=None, phase=None, jitter=0.0, seed=0, **cure):
     domain = {"lower": [-0.1] * 3, "upper": [0.3] * 3}
     s = scenario(bodies=[cube], material=material, domain=domain, seed=seed)
     pool = Pool(Scene(s), capacity_of(s))
-    Laying(s, pool)
+    Placement(s, pool)
     for name, values in (("birth_time", births), ("held", held), ("phase", phase)):
         if values is not None:
             full = pool.fields[name].numpy().copy()
@@ -243,8 +249,9 @@ def draws(chance: Chance, at: wp.array2d(dtype=int), number: wp.array(dtype=floa
 def drawn(particle, generation=0, draw=0, seed=0, purpose="test"):
     at = np.stack(np.broadcast_arrays(np.asarray(particle), generation, draw), axis=1).astype(np.int32)
     number, way = wp.zeros(len(at), dtype=float, device="cpu"), wp.zeros(len(at), dtype=wp.vec3, device="cpu")
-    wp.launch(draws, len(at), [chance_of(seed, purpose), wp.array(at, dtype=int, device="cpu"), number, way],
-              device="cpu")  # fmt: skip
+    wp.launch(
+        draws, len(at), [chance_of(seed, purpose), wp.array(at, dtype=int, device="cpu"), number, way], device="cpu"
+    )
     return number.numpy().astype(float), way.numpy().astype(float)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from fluidbench.layout import emitted
 from fluidbench.measure.deposit import Deposit
 from fluidbench.measure.ledger import deposit_of, final_lengths, ledger, lengths
 from fluidbench.measure.profiles import (
@@ -18,7 +17,8 @@ from fluidbench.measure.profiles import (
     widest_diameter,
 )
 from fluidbench.measure.tower import family_spread, measure_tower, standing
-from fluidbench.particles import CARRIED, CLAMPED
+from fluidbench.method.frame import CARRIED, CLAMPED
+from fluidbench.scenario.layout import emitted
 
 from ..conftest import bead, scenario
 
@@ -88,8 +88,9 @@ FRAME = {
     "position": np.array([[1, 2, 3], [-1, 0, 2], [7, 7, 7]], np.float32) / 100,
     "velocity": np.array([[1, 0, 2], [0, 3, -1], [9, 9, 9]], np.float32),
     "spin": np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [9, 9, 9]]),
-    "birth_time": np.zeros(3), "origin": np.arange(3),
-}  # fmt: skip
+    "birth_time": np.zeros(3),
+    "origin": np.arange(3),
+}
 
 
 def test_the_ledger_leaves_out_what_is_in_the_nozzle():
@@ -119,8 +120,16 @@ def printed(low, high, d=0.002):
     x = np.append(x, [[0.0, 0.0, 0.022]], axis=0)
     held = np.append(np.zeros(len(x) - 1, int), int(CARRIED))
     zeros = np.zeros(len(x))
-    return {"held": held, "position": x, "volume": np.full(len(x), d**3), "mass": np.full(len(x), d**3 * 1e3),
-            "velocity": 0 * x, "spin": 0 * x, "birth_time": zeros, "origin": np.arange(len(x))}  # fmt: skip
+    return {
+        "held": held,
+        "position": x,
+        "volume": np.full(len(x), d**3),
+        "mass": np.full(len(x), d**3 * 1e3),
+        "velocity": 0 * x,
+        "spin": 0 * x,
+        "birth_time": zeros,
+        "origin": np.arange(len(x)),
+    }
 
 
 def test_lengths_come_from_the_free_particles_alone_and_count_from_the_floor():

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from fluidbench.measure.reference import answers, table
-from fluidbench.process.stream import Stream
+from fluidbench.scenario.stream import Stream
 
 from ..conftest import bead, scenario
 
@@ -56,8 +56,15 @@ def test_the_section_of_foam_has_grown_by_the_mean_over_its_ages():
 def test_pauses_lay_no_foam():
     """Two layers of 0.3 s with 0.6 s between them: the mean of R runs over what was laid, not over the pause."""
     material = {"density": 100.0, "expansion": {"ratio": 4.0, "time": 0.2}}
-    path = {"kind": "wall", "start": [0, 0], "end": [0.03, 0], "speed": 0.1, "layers": 2, "layer_height": 0.004,
-            "pause": 0.6}  # fmt: skip
+    path = {
+        "kind": "wall",
+        "start": [0, 0],
+        "end": [0.03, 0],
+        "speed": 0.1,
+        "layers": 2,
+        "layer_height": 0.004,
+        "pause": 0.6,
+    }
     s = bead(material=material, duration=1.2, toolpath=path)
     ages = np.concatenate([np.linspace(0.9, 1.2, 1001), np.linspace(0.0, 0.3, 1001)])
     grown = np.mean(4.0 - 3.0 * np.exp(-ages / 0.2))

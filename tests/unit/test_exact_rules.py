@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from fluidbench.study.evidence import COST_CASES
-from fluidbench.study.verdicts import (
+from fluidbench.paper.evidence import COST_CASES
+from fluidbench.paper.verdicts import (
     APART,
     COLLAPSE,
     CONFIRMED,
@@ -48,11 +48,17 @@ def test_an_error_of_just_the_tolerance_is_within_it():
 
 def test_answers_are_of_the_method_the_class_and_the_spacing_asked_for():
     rows = [
-        trial(LIQUID, "mpm"), trial(LIQUID, "sph"), trial(SOLID, "mpm"), trial(LIQUID, "mpm", level="quick"),
-        trial(LIQUID, "mpm", level="medium"), trial(LIQUID, "mpm", level="rough"), trial(LIQUID, "mpm", level="fine"),
-        trial(LIQUID, "mpm", verdict="skipped"), trial(LIQUID, "mpm", verdict="diverged"),
+        trial(LIQUID, "mpm"),
+        trial(LIQUID, "sph"),
+        trial(SOLID, "mpm"),
+        trial(LIQUID, "mpm", level="quick"),
+        trial(LIQUID, "mpm", level="medium"),
+        trial(LIQUID, "mpm", level="rough"),
+        trial(LIQUID, "mpm", level="fine"),
+        trial(LIQUID, "mpm", verdict="skipped"),
+        trial(LIQUID, "mpm", verdict="diverged"),
         trial(LIQUID, "mpm", verdict="timeout"),
-    ]  # fmt: skip
+    ]
     assert answers_of(rows, ["mpm"], ["liquid"]) == [rows[i] for i in (0, 3, 8, 9)]
     assert answers_of(rows, ["mpm", "sph"], ["liquid", "elastic"]) == [rows[i] for i in (0, 1, 2, 3, 8, 9)]
     assert share_within(rows, "mpm", ["liquid"]) == (2, 3)
@@ -107,14 +113,18 @@ def test_a_verdict_needs_every_resolution():
 
 def laws(of, **methods):
     """Trials of methods with (error, wall) at two spacings or more."""
-    return [trial(of, m, e, wall=w, spacing=of.spacing / (1 + i)) for m, rows in methods.items()
-            for i, (e, w) in enumerate(rows)]  # fmt: skip
+    return [
+        trial(of, m, e, wall=w, spacing=of.spacing / (1 + i))
+        for m, rows in methods.items()
+        for i, (e, w) in enumerate(rows)
+    ]
 
 
 def test_cost_at_the_error_that_the_worst_reaches():
     """Cost ~ error^-2 twice, and error^-1: at 0.1, the worst one's best, 16, 3 (0.2 / 0.1)^2 = 12 and 5 (0.3 / 0.1)."""
-    found = at_equal_error(laws(LIQUID, mpm=[(0.4, 1.0), (0.1, 16.0)], sph=[(0.2, 3.0), (0.05, 48.0)],
-                                pbd=[(0.3, 5.0), (0.05, 30.0)]))  # fmt: skip
+    found = at_equal_error(
+        laws(LIQUID, mpm=[(0.4, 1.0), (0.1, 16.0)], sph=[(0.2, 3.0), (0.05, 48.0)], pbd=[(0.3, 5.0), (0.05, 30.0)])
+    )
     assert found == pytest.approx({"mpm": 16.0, "sph": 12.0, "pbd": 15.0})
 
 
@@ -169,9 +179,13 @@ def test_a_place_at_equal_error_is_that_on_most_cases():
 def test_the_winner_is_the_cheapest_of_those_within_tolerance():
     other = case("c", "liquid", 0.1)
     rows = [
-        trial(LIQUID, "mpm", 0.1, wall=3.0), trial(LIQUID, "sph", 0.05, wall=2.0), trial(LIQUID, "pbd", 0.2, wall=1.0),
-        trial(other, "mpm", 0.01, wall=1.0), trial(other, "sph", 0.01, wall=2.0), trial(SOLID, "pbd", wall=0.1),
-    ]  # fmt: skip
+        trial(LIQUID, "mpm", 0.1, wall=3.0),
+        trial(LIQUID, "sph", 0.05, wall=2.0),
+        trial(LIQUID, "pbd", 0.2, wall=1.0),
+        trial(other, "mpm", 0.01, wall=1.0),
+        trial(other, "sph", 0.01, wall=2.0),
+        trial(SOLID, "pbd", wall=0.1),
+    ]
     assert winners(rows, ["liquid"]) == {"sph": 1, "mpm": 1}
     again = case("d", "liquid", 0.1)
     assert winners([*rows, trial(again, "sph")], ["liquid"]) == {"sph": 2, "mpm": 1}

@@ -54,8 +54,14 @@ def test_the_reference_speed_of_a_print_and_of_foam():
 def test_speeds_of_sound():
     still = boxed(sound_speed_ratio=20.0)
     assert still.liquid_sound_speed == pytest.approx(0.02) == pytest.approx(still.wave_speed) == still.top_wave_speed
-    solid = boxed(material={"density": 4.0, "youngs_modulus": 6.0, "poisson_ratio": 0.25,
-                            "cure": {"youngs_modulus": 54.0, "time": 0.005, "kind": "linear"}})  # fmt: skip
+    solid = boxed(
+        material={
+            "density": 4.0,
+            "youngs_modulus": 6.0,
+            "poisson_ratio": 0.25,
+            "cure": {"youngs_modulus": 54.0, "time": 0.005, "kind": "linear"},
+        }
+    )
     k, shear = 6.0 / 1.5, 6.0 / 2.5
     assert solid.wave_speed == pytest.approx(math.sqrt((k + 4 * shear / 3) / 4.0))
     assert solid.top_wave_speed == pytest.approx(3.0 * solid.wave_speed)
@@ -79,8 +85,12 @@ def test_peak_acceleration_is_where_material_starts():
 
 def test_the_potential_by_hand():
     """x g + (x - c) D (x - c) / 2 with g = (1, 0, -10), D = diag(2, 4, 0), c = (1, 0, 0) at (2, 3, 5)."""
-    s = boxed(gravity=[0, 0, -10.0], body_force=[1.0, 0, 0], body_force_gradient=[[2.0, 0, 0], [0, 4.0, 0], [0, 0, 0]],
-              body_force_center=[1.0, 0, 0])  # fmt: skip
+    s = boxed(
+        gravity=[0, 0, -10.0],
+        body_force=[1.0, 0, 0],
+        body_force_gradient=[[2.0, 0, 0], [0, 4.0, 0], [0, 0, 0]],
+        body_force_center=[1.0, 0, 0],
+    )
     assert s.potential_at(np.array([[2.0, 3.0, 5.0]])).tolist() == pytest.approx([2.0 - 50.0 + 0.5 * (2.0 + 36.0)])
     assert s.acceleration.tolist() == [1.0, 0.0, -10.0]
 
@@ -116,8 +126,13 @@ def test_rounding_makes_no_tick():
 def test_walls_are_six_in_order_and_periodic_in_pairs():
     walls = Walls(x_lower="stick", z_lower={"friction": 0.5}, y_lower="periodic", y_upper="periodic")
     assert [w if isinstance(w, str) else w.friction for w in walls.faces()] == [
-        "stick", "slip", "periodic", "periodic", 0.5, "slip",
-    ]  # fmt: skip
+        "stick",
+        "slip",
+        "periodic",
+        "periodic",
+        0.5,
+        "slip",
+    ]
     assert walls.periodic() == (False, True, False)
     for axis in "xyz":
         own = {f"{axis}_lower": "periodic", f"{axis}_upper": "periodic"}

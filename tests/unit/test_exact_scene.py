@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 from fluidbench.errors import UserError
-from fluidbench.scene import (
+from fluidbench.native.scene import (
     FRICTION,
     NEVER_YIELDS,
     PERIODIC,
@@ -26,10 +26,28 @@ from ..conftest import scenario
 
 wp.set_module_options({"enable_backward": False})
 
-PASTE = {"density": 1000.0, "youngs_modulus": 2.6e4, "yield_stress": 50.0, "plastic_viscosity": 3.0, "flow_index": 0.5,
-         "viscosity": 0.25}  # fmt: skip
-NAMES = ("density", "bulk_modulus", "shear_modulus", "viscosity", "yield_stress", "plastic_viscosity", "flow_index",
-         "relaxation_rate", "tait", "tension_limit", "wave_speed", "cure")  # fmt: skip
+PASTE = {
+    "density": 1000.0,
+    "youngs_modulus": 2.6e4,
+    "yield_stress": 50.0,
+    "plastic_viscosity": 3.0,
+    "flow_index": 0.5,
+    "viscosity": 0.25,
+}
+NAMES = (
+    "density",
+    "bulk_modulus",
+    "shear_modulus",
+    "viscosity",
+    "yield_stress",
+    "plastic_viscosity",
+    "flow_index",
+    "relaxation_rate",
+    "tait",
+    "tension_limit",
+    "wave_speed",
+    "cure",
+)
 
 
 def rows(*materials, **more):
@@ -41,11 +59,22 @@ def rows(*materials, **more):
 def test_the_phase_of_a_paste():
     (row,) = rows(PASTE)
     k = 2.6e4 / (3 * 0.4)
-    assert row == pytest.approx({
-        "density": 1000.0, "bulk_modulus": k, "shear_modulus": 1e4, "viscosity": 0.25, "yield_stress": 50.0,
-        "plastic_viscosity": 3.0, "flow_index": 0.5, "relaxation_rate": 0.0, "tait": 0.0, "tension_limit": 1e30,
-        "wave_speed": math.sqrt((k + 4e4 / 3) / 1000.0), "cure": 0.0,
-    })  # fmt: skip
+    assert row == pytest.approx(
+        {
+            "density": 1000.0,
+            "bulk_modulus": k,
+            "shear_modulus": 1e4,
+            "viscosity": 0.25,
+            "yield_stress": 50.0,
+            "plastic_viscosity": 3.0,
+            "flow_index": 0.5,
+            "relaxation_rate": 0.0,
+            "tait": 0.0,
+            "tension_limit": 1e30,
+            "wave_speed": math.sqrt((k + 4e4 / 3) / 1000.0),
+            "cure": 0.0,
+        }
+    )
 
 
 def test_the_phase_of_liquids():
@@ -123,8 +152,14 @@ def test_solid_is_what_never_flows():
 
 
 def test_walls_are_laid_out_face_by_face():
-    walls = {"x_lower": "stick", "x_upper": {"friction": 0.25}, "y_lower": "periodic", "y_upper": "periodic",
-             "z_lower": {"friction": 0.5}, "z_upper": "slip"}  # fmt: skip
+    walls = {
+        "x_lower": "stick",
+        "x_upper": {"friction": 0.25},
+        "y_lower": "periodic",
+        "y_upper": "periodic",
+        "z_lower": {"friction": 0.5},
+        "z_upper": "slip",
+    }
     s = scenario(domain={"lower": [0, -0.1, 0.01], "upper": [0.3, 0.1, 0.08], "walls": walls})
     box = box_of(s)
     assert list(box.lower) == pytest.approx([0, -0.1, 0.01]) and list(box.upper) == pytest.approx([0.3, 0.1, 0.08])
@@ -145,8 +180,10 @@ def test_the_force_field_on_the_device_is_the_scenarios():
     field.uniform, field.gradient = wp.vec3(*force["uniform"].tolist()), wp.mat33(*force["gradient"].ravel().tolist())
     assert list(force_at(field, wp.vec3(*x))) == pytest.approx(expected, rel=1e-6)
     h = 1e-3
-    slope = [(force_potential(field, wp.vec3(*(x + h * e))) - force_potential(field, wp.vec3(*(x - h * e)))) / (2 * h)
-             for e in np.eye(3)]  # fmt: skip
+    slope = [
+        (force_potential(field, wp.vec3(*(x + h * e))) - force_potential(field, wp.vec3(*(x - h * e)))) / (2 * h)
+        for e in np.eye(3)
+    ]
     assert slope == pytest.approx(expected, rel=1e-4)
     assert force_potential(field, wp.vec3(0.0, 0.0, 0.0)) == 0.0
 

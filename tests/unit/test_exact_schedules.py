@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fluidbench.cure import Cure
-from fluidbench.expansion import Expansion
+from fluidbench.scenario.cure import Cure
+from fluidbench.scenario.expansion import Expansion
 
 E, K, K2 = 1e5, 0.5, 1.5
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fluidbench.measure.reference import Answer
 from fluidbench.study import select as module
 from fluidbench.study.select import (
     Candidate,
@@ -13,16 +14,16 @@ from fluidbench.study.select import (
     Selection,
     Trust,
     assess,
+    candidates,
     confidence,
     extrapolate,
     physics_of,
     select,
     trust_of,
 )
-from fluidbench.target import Target
 
 from ..conftest import bead, scenario
-from .made import BEAD, finished
+from .made import BEAD, finished, working, workplace_in
 
 ALWAYS = (math.inf, math.inf)
 
@@ -146,12 +147,17 @@ def test_the_worst_length_decides(monkeypatch):
 
 def test_an_exact_length_is_judged_against_its_answer_alone(monkeypatch):
     trusting(monkeypatch, "mpm")
-    answer = [{"quantity": "bead area [m^2]", "reference": 2.0}, {"quantity": "slump", "reference": 9.0}]
+    answer = [
+        Answer(name, 0.0, reference, 0.0, "relative", "s")
+        for name, reference in (("bead area [m^2]", 2.0), ("slump", 9.0))
+    ]
     rows = [run("mpm", d, answers=answer, bead_area_m2=a) for d, a in ((1.0, 2.2), (2.0, 1.6), (4.0, 2.0))]
     found = assess(BEAD, ["mpm"], rows)
     assert [(c.discretisation, c.bias) for c in found.candidates] == [
-        (pytest.approx(0.1), 0.0), (pytest.approx(0.2), 0.0), (0.0, 0.0),
-    ]  # fmt: skip
+        (pytest.approx(0.1), 0.0),
+        (pytest.approx(0.2), 0.0),
+        (0.0, 0.0),
+    ]
     assert not found.erratic
 
 
@@ -239,9 +245,9 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
     trusting(monkeypatch, "mpm", "sph")
     rows = line("mpm", limits[0], 0.2) + line("sph", limits[1], 0.2) + line("pbd", 99.0, 0.2)
     for r in rows:
-        if r.record["method"] == "mpm":
-            r.record["measures"]["slump"] = 0.1 * r.record["spacing_m"]  # a length that the others do not have
-        r.record["measures"]["front_x_m"] = 1.0  # and one in which all agree
+        if r.method == "mpm":
+            r.record.measures["slump"] = 0.1 * r.record.spacing_m  # a length that the others do not have
+        r.record.measures["front_x_m"] = 1.0  # and one in which all agree
     found = assess(BEAD, ["mpm", "sph", "pbd"], rows)
     assert confidence(found, tolerance) == sure
     found.erratic.add("sph")
@@ -253,16 +259,27 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
     assert confidence(parted, 1e9) == "medium: the limits of mpm and sph differ by at most inf%"
 
 
-def test_four_spacings_are_run_of_every_method_where_the_nozzle_allows(monkeypatch):
-    planned = []
-    monkeypatch.setattr(module, "execute", lambda jobs, *_: planned.extend(jobs) or [])
-    select(BEAD, ["mpm", "sph"], None, None, Target(), 5.0)
+def test_four_spacings_are_run_of_every_method_where_the_nozzle_allows(tmp_path):
+    place = workplace_in(tmp_path, wall_limit=5.0)
+    planned = candidates(BEAD, ["mpm", "sph"], place)
     assert [(j.method, j.scenario["spacing"]) for j in planned] == [
         (m, pytest.approx(f * 1.5e-3)) for m in ("mpm", "sph") for f in (2.0, 1.5, 1.0, 0.75)
     ]
     assert {j.wall_limit for j in planned} == {5.0}
-    planned.clear()
-    select(
-        BEAD.model_copy(update={"spacing": 4e-3}), ["mpm"], None, None, Target(), 5.0
-    )  # 8 mm do not fit twice into 12
+    planned = candidates(BEAD.model_copy(update={"spacing": 4e-3}), ["mpm"], place)  # 8 mm do not fit twice into 12
     assert [j.scenario["spacing"] for j in planned] == pytest.approx([6e-3, 4e-3, 3e-3])
+
+
+@pytest.mark.parametrize(
+    ("verdict", "count", "lacks"), [("completed", 4, False), ("refused", 0, False), ("timeout", 0, True)]
+)
+def test_a_selection_needs_candidates_and_every_run(tmp_path, monkeypatch, verdict, count, lacks):
+    def answer(job):
+        d = job.scenario["spacing"]
+        return finished(job.method, verdict, {"bead_width_m": 0.01 + d}, spacing=d)
+
+    calls = working(monkeypatch, answer)
+    made = select(BEAD, "mpm", tolerance=9.0, out=tmp_path, progress=False)
+    assert len(made.table) == len(made.found.candidates) == count and bool(made.missing) is lacks
+    assert made.ok is (verdict == "completed") and len(made.runs) == 4 and [call.workers for call in calls] == [1]
+    assert made.findings[1].startswith("Recommended: mpm") if count else made.findings[0].startswith("No recomm")

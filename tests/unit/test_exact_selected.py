@@ -4,14 +4,10 @@ import math
 
 import pytest
 
-from fluidbench.report import select as page
-from fluidbench.study.select import (
-    Candidate,
-    Selection,
-    Trust,
-)
+from fluidbench.study import select_report as page
+from fluidbench.study.select import Candidate, Selection, Trust
 
-from .made import BEAD, finished
+from .made import BEAD, change, finished
 
 ALWAYS = (math.inf, math.inf)
 
@@ -24,7 +20,7 @@ def made(*rows, method="mpm", bias=0.0):
 
 def words(found, tolerance=0.2, budget=math.inf, pace=math.inf):
     for c in found.candidates:
-        c.run.record["machine"] = {"cores": "2"}
+        change(c.run, machine={"cores": "2"})
     return page._findings(BEAD, "line_bead", found, tolerance, budget, pace)
 
 
@@ -82,11 +78,18 @@ def test_tables_and_plot_of_the_candidates(tmp_path):
     assert (list(dominated.x), list(dominated.y)) == ([5.0], [pytest.approx(41.0)])
     assert (list(best.x), list(best.y)) == ([4.0, 8.0], pytest.approx([21.0, 11.0]))
     for c in found.candidates:
-        c.run.record.update(key="k", machine={"cores": "2"})
+        change(c.run, machine={"cores": "2"})
         object.__setattr__(c.run, "folder", tmp_path / "runs" / "x")
     data = page.report(BEAD, "line_bead", found, 0.2, *[math.inf] * 2, tmp_path).data
     assert data["on_front"].tolist() == [True, True, False] and data["wall_s"].tolist() == [8.0, 4.0, 5.0]
     assert page._row(found.candidates[0], True) == {
-        "method": "mpm", "spacing_m": 1.0, "mean_dt_s": 1e-4, "wall_s": 8.0, "wall_per_simulated_s": 80.0,
-        "error": pytest.approx(0.11), "discretisation": 0.1, "bias": 0.01, "on_front": True,
-    }  # fmt: skip
+        "method": "mpm",
+        "spacing_m": 1.0,
+        "mean_dt_s": 1e-4,
+        "wall_s": 8.0,
+        "wall_per_simulated_s": 80.0,
+        "error": pytest.approx(0.11),
+        "discretisation": 0.1,
+        "bias": 0.01,
+        "on_front": True,
+    }

@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fluidbench import solver
 from fluidbench.errors import UserError
-from fluidbench.model import Model, NonNegative, Positive, Vector, check_number, check_size
-from fluidbench.solver import Demands, Feature, approximations, configure, get_solver, refusal
-from fluidbench.timestep import Bound
+from fluidbench.method.contract import Config
+from fluidbench.method.features import Feature, needed
+from fluidbench.method.suitability import Demands, approximations, check_backend, refusal
+from fluidbench.method.timestep import Bound
+from fluidbench.registry import get_method
+from fluidbench.scenario.model import Model, NonNegative, Positive, Vector, check_number, check_size
+from fluidbench.scenario.numerics import configure
 
-from ..conftest import scenario
+from ..conftest import bead, scenario
 
 
 class Numbers(Model):
@@ -29,11 +32,14 @@ class Numbers(Model):
     [
         ("positive", (1e-18, 1e18, 1), (0.0, -1.0, 0.99e-18, 1.01e18, math.inf, math.nan, True)),
         ("some", (0.0, 1e-18, 1e18), (-1e-300, 0.99e-18, 1.01e18, False)),
-        ("place", ([0, 1e18, -1e18], [1.3e-38, 0, 0], [-1.3e-38, 0, 0]),
-         ([0, 1.01e18, 0], [0, 0, -1.01e18], [1.1e-38, 0, 0], [-1.1e-38, 0, 0], [math.nan, 0, 0], [True, 0, 0])),
+        (
+            "place",
+            ([0, 1e18, -1e18], [1.3e-38, 0, 0], [-1.3e-38, 0, 0]),
+            ([0, 1.01e18, 0], [0, 0, -1.01e18], [1.1e-38, 0, 0], [-1.1e-38, 0, 0], [math.nan, 0, 0], [True, 0, 0]),
+        ),
         ("flag", (True, False), ("x",)),
     ],
-)  # fmt: skip
+)
 def test_numbers_are_those_that_single_precision_can_square(key, good, bad):
     for value in good:
         Numbers(**{key: value})
@@ -74,7 +80,7 @@ class Paced:
     """A method whose only bound is a constant over the wave speed."""
 
     name, features, dt = "paced", frozenset(Feature), 1.0
-    Config: ClassVar = solver.Config
+    Config: ClassVar = Config
 
     @classmethod
     def bounds(cls, s, config, speed):
@@ -129,23 +135,58 @@ def test_a_step_that_loses_a_tenth_of_the_speed_is_refused_and_a_hundredth_is_to
     assert refusal(still, s, None) == "its own reason"  # nothing moves, so nothing can be lost
     assert [len(approximations(*lossy(share, 2.0), None)) for share in (0.0101, 0.0099)] == [2, 1]
     assert approximations(*lossy(0.02, 2.0), None) == [
-        "a little", "motion slower than 0.04 m/s is lost in single precision at this time step"
-    ]  # fmt: skip
+        "a little",
+        "motion slower than 0.04 m/s is lost in single precision at this time step",
+    ]
 
 
-def test_what_a_method_cannot_do_is_refused_by_name():
-    plain = type("Plain", (Paced,), {"features": frozenset({Feature.PRESSURE})})
-    foam = {"density": 1000.0, "youngs_modulus": 1e4, "expansion": {"ratio": 2.0}}
-    assert refusal(plain, soft_then_stiff(), None) == "it has no material parameters that change with age"
-    assert refusal(plain, scenario(material=foam), None) == "it has no rest volumes that grow"
-    assert "age and no rest" in refusal(
-        plain, scenario(material=foam | {"cure": {"delay": 1.0, "youngs_modulus": 2e4}}), None
+SOLID = {"density": 1000.0, "youngs_modulus": 1e4}
+BOX = {"kind": "box", "center": [0.05] * 3, "size": [0.08] * 3}
+ASKS = {
+    Feature.VISCOSITY: {"material": {"density": 1000.0, "viscosity": 1.0}},
+    Feature.ELASTICITY: {"material": SOLID},
+    Feature.YIELD: {"material": SOLID | {"yield_stress": 9.0}},
+    Feature.RELAXATION: {"material": SOLID | {"relaxation_time": 0.1}},
+    Feature.FRICTION: {"domain": {"lower": [0] * 3, "upper": [0.2] * 3, "walls": {"z_lower": {"friction": 0.3}}}},
+    Feature.PERIODIC: {
+        "domain": {"lower": [0] * 3, "upper": [0.2] * 3, "walls": {"x_lower": "periodic", "x_upper": "periodic"}}
+    },
+    Feature.CURE: {"material": SOLID | {"cure": {"delay": 1.0, "youngs_modulus": 2e4}}},
+    Feature.EXPANSION: {"material": SOLID | {"expansion": {"ratio": 2.0}}},
+    Feature.CLAMP: {"bodies": [BOX | {"clamped": True}]},
+    Feature.LATER: {"bodies": [BOX, BOX | {"center": [0.15] * 3, "start": 0.005}]},
+    Feature.FIELD: {"body_force_gradient": np.diag([-1.0] * 3).tolist()},
+}
+PRINTS = {
+    Feature.EMISSION: {},
+    Feature.COLLIDER: {"collider": {"parts": [{"kind": "sphere", "center": [0.0, 0.0, 0.03], "radius": 0.005}]}},
+}
+
+
+@pytest.mark.parametrize("feature", Feature, ids=lambda f: f.name)
+def test_what_a_method_cannot_do_is_refused_by_name(feature):
+    """One feature less than all: only what needs it is refused."""
+    lacks = type("Lacks", (Paced,), {"features": frozenset(Feature) - {feature}})
+    for asked, table in (ASKS | PRINTS).items():
+        s = bead(**table) if asked in PRINTS else scenario(**table)
+        refused = feature is asked or feature in needed(s)
+        assert (refusal(lacks, s, None) == f"it has no {feature.value}") is refused
+        assert asked in needed(s)
+    assert refusal(lacks, scenario(), None) == "its own reason"
+
+
+def test_all_that_a_method_lacks_is_listed_in_order():
+    plain = type("Plain", (Paced,), {"features": frozenset()})
+    both = SOLID | {"expansion": {"ratio": 2.0}, "cure": {"delay": 1.0, "youngs_modulus": 2e4}}
+    assert refusal(plain, scenario(material=both), None) == (
+        "it has no elastic shear stress and no material parameters that change with age and no rest volumes that grow"
     )
-    assert refusal(plain, scenario(), None) == "its own reason"
+    assert needed(scenario()) == frozenset() and refusal(plain, scenario(), None) == "its own reason"
+    assert needed(scenario(material=SOLID)) == {Feature.ELASTICITY}
 
 
 def test_settings_of_methods_are_read_or_refused():
-    assert configure(get_solver("mpm"), scenario(numerics={"mpm": {"safety": 0.5}})).safety == 0.5
+    assert configure(get_method("mpm"), scenario(numerics={"mpm": {"safety": 0.5}})).safety == 0.5
     for numerics, words in (
         ({"mpn": {}}, "numerics.mpn: no method of that name; did you mean 'mpm'"),
         ({"mpm": {"safty": 1}}, "numerics.mpm: unknown key 'safty'; did you mean 'safety'"),
@@ -154,6 +195,6 @@ def test_settings_of_methods_are_read_or_refused():
         with pytest.raises(UserError, match=words):
             scenario(numerics=numerics)
     with pytest.raises(UserError, match="no solver named 'mpn'; did you mean 'mpm'"):
-        get_solver("mpn")
+        get_method("mpn")
     with pytest.raises(UserError, match="mpm has no backend 'cuda'; it has warp and taichi"):
-        solver.check_backend(get_solver("mpm"), SimpleNamespace(backend="cuda"))
+        check_backend(get_method("mpm"), SimpleNamespace(backend="cuda"))

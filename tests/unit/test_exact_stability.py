@@ -1,20 +1,17 @@
 """Theory by hand, blocks and lumps as they are described, limits as they are bracketed, and what is said of them."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from fluidbench.solver import get_solver
-from fluidbench.study import limits, stability
+from fluidbench.measure.reference import table
+from fluidbench.method.target import Target
+from fluidbench.method.vitals import Vital
+from fluidbench.registry import get_method
+from fluidbench.study import limits
 from fluidbench.study.limits import Limit, bisect, block, default_dt, lump
-from fluidbench.study.stability import (
-    BARE,
-    BLOCKS,
-    theory,
-)
-from fluidbench.target import Target
+from fluidbench.study.stability import BLOCKS
 
 from ..conftest import bead, scenario
 
@@ -32,41 +29,43 @@ def damped(wave, viscous):
 
 def test_theory_of_mpm_is_the_fourier_analysis_in_bulk():
     """Bulk waves 1.27 .. 1.31 and damping 0.26 .. 0.42 dx^2 / nu, say the tables; whatever share the method takes."""
-    rows = stability.reference("mpm_stability_limits")
+    rows = table("mpm_stability_limits")
     bulk = rows[(rows["arrangement"] == "3d bulk 8 per cell regular") & (rows["gradient"] == "mls")].set_index(
         "material"
     )
     wave, damp = ((bulk.loc[m, "min"] + bulk.loc[m, "max"]) / 2 for m in ("fluid", "viscous"))
     assert wave == pytest.approx(1.29)
-    solver, still = get_solver("mpm"), block(WATER, 0.01)  # cells of 2 d = 0.02 divide 0.08
+    solver, still = get_method("mpm"), block(WATER, 0.01)  # cells of 2 d = 0.02 divide 0.08
     for safety in (0.8, 0.4):
-        got = theory("mpm", still, solver.Config(safety=safety))
+        got = get_method("mpm").theory(still, solver.Config(safety=safety))
         assert got == pytest.approx(wave * 0.02 / 10.0, rel=2e-3)  # an isolated particle's 1/sqrt(3) to three digits
     thick = block({**WATER, "sound_speed": 0.05, "viscosity": 100.0}, 0.01)
-    got = theory("mpm", thick, solver.Config())
+    got = get_method("mpm").theory(thick, solver.Config())
     assert got == pytest.approx(damped(wave * 0.02 / 0.05, damp * 0.02**2 / 0.1), rel=5e-3)
 
 
 def test_theory_of_sph_is_the_fourier_analysis_at_its_smoothing_length():
     """Between h / dx = 1.5 and 2: C_h from 1.729 to 1.725, D from 0.113 to 0.126."""
-    solver, still = get_solver("sph"), block(WATER, 0.01)
-    config = solver.Config(**BARE["sph"])
+    solver, still = get_method("sph"), block(WATER, 0.01)
+    config = solver.Config(**get_method("sph").bare)
     h = 0.018
     wave = (1.729 + 0.6 * (1.725 - 1.729)) * h / 10.0
-    assert theory("sph", still, config) == pytest.approx(wave, rel=1e-9)
+    assert get_method("sph").theory(still, config) == pytest.approx(wave, rel=1e-9)
     thick = block({**WATER, "sound_speed": 0.05, "viscosity": 100.0}, 0.01)
     slow, damp = wave * 10.0 / 0.05, (0.113 + 0.6 * 0.013) * h**2 / 0.1
     for settings in ({}, {"cfl": 0.2, "viscous_number": 0.05}):
-        got = theory("sph", thick, solver.Config(**BARE["sph"], **settings))
+        got = get_method("sph").theory(thick, solver.Config(**get_method("sph").bare, **settings))
         assert got == pytest.approx(damped(slow, damp), rel=1e-9)
     solid = block({"density": 1000.0, "youngs_modulus": 1e5}, 0.01)
     c = solid.wave_speed
-    assert theory("sph", solid, config) == pytest.approx(1.729 * 0.015 / c)
-    assert theory("pbd", still, get_solver("pbd").Config()) is None
+    assert get_method("sph").theory(solid, config) == pytest.approx(1.729 * 0.015 / c)
+    assert get_method("pbd").theory(still, get_method("pbd").Config()) is None
 
 
 def test_bare_is_without_what_theory_does_not_know():
-    assert {
+    assert {name: get_method(name).bare for name in ("mpm", "sph", "pbd")} == {
+        "mpm": {},
+        "pbd": {},
         "sph": dict.fromkeys(
             (
                 "density_diffusion",
@@ -76,8 +75,8 @@ def test_bare_is_without_what_theory_does_not_know():
                 "artificial_stress",
             ),
             0.0,
-        )
-    } == BARE
+        ),
+    }
     assert BLOCKS["acoustic"] == {"density": 1000.0, "sound_speed": 10.0}
 
 
@@ -120,8 +119,10 @@ def test_a_block_is_periodic_at_rest_without_gravity():
 
 def test_a_lump_is_thrown_at_its_floor():
     """Six spacings of the bead's paste in a room of eighteen, a quarter of one above the floor."""
-    s = bead(domain={"lower": [-0.02, -0.02, -0.01], "upper": [0.05, 0.02, 0.025]},
-             nozzle={"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.010})  # fmt: skip
+    s = bead(
+        domain={"lower": [-0.02, -0.02, -0.01], "upper": [0.05, 0.02, 0.025]},
+        nozzle={"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.010},
+    )
     made, v, d = lump(s, 1e-4), s.reference_speed, s.spacing
     (body,) = made.bodies
     assert body.center == pytest.approx((9 * d, 9 * d, -0.01 + 3.25 * d)) and body.size == pytest.approx((6 * d,) * 3)
@@ -139,7 +140,7 @@ def test_a_lump_is_thrown_at_its_floor():
 
 
 def test_the_methods_own_step_allows_a_quarter_more_speed():
-    solver, s = get_solver("pbd"), scenario()
+    solver, s = get_method("pbd"), scenario()
     dt, name = default_dt(s, solver, solver.Config())
     assert name == "accuracy" and dt == pytest.approx(0.125 * 0.01 / (1.25 * s.reference_speed))
     assert (limits.GROWTH, limits.STEPS, limits.LOOKS, limits.LUMP_STEPS, limits.AMPLITUDE) == (
@@ -155,19 +156,19 @@ def test_the_methods_own_step_allows_a_quarter_more_speed():
 def played(monkeypatch):
     """A simulation whose kinetic energy and troubles are written down; `march` counts its substeps."""
 
-    def make(energies, broken=(), complaint=None, fault=None):
+    def make(energies, broken=(), complaint=None, shortage=None):
         marched = []
 
         class Played:
-            def __init__(self, s, method, target, config=None):
-                self.scene = SimpleNamespace(allow_tension=lambda: marched.append("tension"))
-                self.velocity = None
-                self.pool = SimpleNamespace(size=3, velocity=SimpleNamespace(assign=self.kick))
-                self.health = SimpleNamespace(broken=lambda: len(marched) - 1 in broken)
+            capacity = 3
+
+            def __init__(self, s, config, target):
                 self.looks = 0
 
+            def allow_tension(self):
+                marched.append("tension")
+
             def kick(self, v):
-                self.kicked = v
                 make.kick = v
 
             def march(self, dt, steps):
@@ -175,12 +176,11 @@ def played(monkeypatch):
 
             def look(self):
                 self.looks += 1
-                return SimpleNamespace(kinetic=energies(self.looks - 1), complaint=complaint and complaint(self.looks))
+                said = [what and what(self.looks) for what in (complaint, shortage)]
+                found = "it broke" if len(marched) - 1 in broken else None
+                return Vital(1.0, energies(self.looks - 1), 0.0, *said, broken=found)
 
-            def fault(self):
-                return fault and fault(self.looks)
-
-        monkeypatch.setattr(limits, "Simulation", Played)
+        monkeypatch.setattr(get_method("mpm"), "start", Played)
         return marched
 
     return make
@@ -197,7 +197,7 @@ def test_a_block_is_stable_while_its_energy_grows_less_than_a_hundredfold(played
 
     def stable(energies, broken=()):
         marched = played(energies, broken)
-        limits.block_limit(block(WATER, 0.01), get_solver("mpm"), None, 0.25, 0.1, Target())
+        limits.block_limit(block(WATER, 0.01), get_method("mpm"), None, 0.25, 0.1, Target())
         return answers[-1][0], marched
 
     calm, marched = stable(lambda i: 1.0 + (i > 0) * 98.9)
@@ -210,10 +210,10 @@ def test_a_block_is_stable_while_its_energy_grows_less_than_a_hundredfold(played
 
 
 def test_a_lump_survives_while_nothing_is_wrong(played):
-    s, solver = scenario(), get_solver("mpm")
+    s, solver = scenario(), get_method("mpm")
     marched = played(lambda i: 1.0)
     assert limits.lump_survives(s, solver, None, 1e-3, Target()) is None and marched == [(1e-3, 4)] * 100
     marched = played(lambda i: 1.0, complaint=lambda n: "too fast" if n == 3 else None)
     assert limits.lump_survives(s, solver, None, 1e-3, Target()) == "too fast" and len(marched) == 3
-    played(lambda i: 1.0, fault=lambda n: "full" if n == 3 else None)
+    played(lambda i: 1.0, shortage=lambda n: "full" if n == 3 else None)
     assert limits.lump_survives(s, solver, None, 1e-3, Target()) == "full"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.layout import capacity_of, emitted, generations, sample, sources
-from fluidbench.process.stream import Stream, disc
+from fluidbench.scenario.layout import capacity_of, emitted, generations, sample, sources
+from fluidbench.scenario.stream import Stream, disc
 
 from ..conftest import bead, scenario
 
@@ -70,8 +70,14 @@ def test_four_discs_wait_in_the_nozzle():
 
 def test_pauses_hold_the_stream_back_and_corners_turn_it():
     """Two legs of 30 mm at 0.1 m/s on each of two layers; the pause of 0.1 s comes before disc 30."""
-    path = {"kind": "polyline", "points": [[0, 0], [0.03, 0], [0.03, 0.03]], "speed": 0.1, "layers": 2,
-            "layer_height": 0.004, "pause": 0.1}  # fmt: skip
+    path = {
+        "kind": "polyline",
+        "points": [[0, 0], [0.03, 0], [0.03, 0.03]],
+        "speed": 0.1,
+        "layers": 2,
+        "layer_height": 0.004,
+        "pause": 0.1,
+    }
     domain = {"lower": [-0.02, -0.02, 0], "upper": [0.05, 0.05, 0.025]}
     stream = Stream(bead(toolpath=path, domain=domain, duration=2.0))
     expected = 0.01 + 0.02 * np.arange(60)

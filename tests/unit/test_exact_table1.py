@@ -2,20 +2,11 @@
 
 import pytest
 
-from fluidbench.solver import get_solver
-from fluidbench.study import table1 as module
-from fluidbench.study.evidence import METHODS, SHIPPED
-from fluidbench.study.table1 import (
-    best_for,
-    bound_dt,
-    cost,
-    fidelity,
-    limits,
-    paradigm,
-    stability,
-    table1,
-)
-from fluidbench.study.verdicts import CONFIRMED, OPEN, REFUTED
+from fluidbench.paper import table1 as module
+from fluidbench.paper.evidence import METHODS, SHIPPED
+from fluidbench.paper.table1 import best_for, bound_dt, cells, cost, fidelity, limits, paradigm, stability
+from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
+from fluidbench.registry import get_method
 
 from .made import BEAD, case, evidence, finished, known, repeated, trial
 
@@ -24,19 +15,27 @@ SOFT = ("viscous", "yield stress", "elastic", "viscoelastic")
 
 def test_a_paradigm_is_no_claim():
     assert [(c.row, c.method, c.rule, c.verdict, c.measured) for c in paradigm()] == [
-        ("paradigm", m, "definition", OPEN, get_solver(m).paradigm) for m in METHODS
+        ("paradigm", m, "definition", OPEN, get_method(m).paradigm) for m in METHODS
     ]
 
 
 @pytest.mark.parametrize(
     ("method", "physics", "good", "bad", "verdict"),
     [
-        ("mpm", "elastic", 3, 1, CONFIRMED), ("mpm", "elastic", 2, 1, REFUTED), ("mpm", "elastic", 1, 0, OPEN),
-        ("mpm", "elastic", 2, 0, CONFIRMED), ("sph", "liquid", 3, 1, CONFIRMED), ("sph", "liquid", 5, 2, REFUTED),
-        ("pbd", "liquid", 1, 1, CONFIRMED), ("pbd", "liquid", 2, 1, REFUTED), ("pbd", "liquid", 0, 1, OPEN),
-        ("pbd", "viscous", 0, 2, CONFIRMED), ("mpm", "liquid", 2, 0, OPEN), ("sph", "elastic", 2, 0, OPEN),
+        ("mpm", "elastic", 3, 1, CONFIRMED),
+        ("mpm", "elastic", 2, 1, REFUTED),
+        ("mpm", "elastic", 1, 0, OPEN),
+        ("mpm", "elastic", 2, 0, CONFIRMED),
+        ("sph", "liquid", 3, 1, CONFIRMED),
+        ("sph", "liquid", 5, 2, REFUTED),
+        ("pbd", "liquid", 1, 1, CONFIRMED),
+        ("pbd", "liquid", 2, 1, REFUTED),
+        ("pbd", "liquid", 0, 1, OPEN),
+        ("pbd", "viscous", 0, 2, CONFIRMED),
+        ("mpm", "liquid", 2, 0, OPEN),
+        ("sph", "elastic", 2, 0, OPEN),
     ],
-)  # fmt: skip
+)
 def test_fidelity_is_the_share_of_known_answers(method, physics, good, bad, verdict):
     cells = fidelity(evidence(known(method, good, bad, physics)))
     kind = "liquids" if physics == "liquid" else "deformables and viscous"
@@ -62,18 +61,26 @@ def test_fidelity_takes_all_four_classes_of_what_deforms_and_says_what_is_shippe
 def limit(method, *steps, verdict="held", found=True):
     """Rows of `stability`: at half a spacing and one, dt is so many times d / c."""
     return [
-        {"method": method, "axis": "spacing", "value": v, "verdict": verdict, "lump_limit_found": found,
-         "dt_lump_s": step * v * BEAD.spacing / BEAD.wave_speed} for v, step in zip((0.5, 1.0), steps, strict=False)
-    ]  # fmt: skip
+        {
+            "method": method,
+            "axis": "spacing",
+            "value": v,
+            "verdict": verdict,
+            "lump_limit_found": found,
+            "dt_lump_s": step * v * BEAD.spacing / BEAD.wave_speed,
+        }
+        for v, step in zip((0.5, 1.0), steps, strict=False)
+    ]
 
 
 def test_stable_steps_are_compared_over_d_by_c():
     rows = {"mpm": limit("mpm", 0.5, 0.5), "sph": limit("sph", 0.2, 0.2), "pbd": limit("pbd", 2.0, 2.0, found=False)}
     cells = stability(evidence(limits=rows))
     assert [(c.method, c.paper, c.verdict) for c in cells] == [
-        ("mpm", "medium, medium dt", CONFIRMED), ("sph", "low, smaller dt", CONFIRMED),
+        ("mpm", "medium, medium dt", CONFIRMED),
+        ("sph", "low, smaller dt", CONFIRMED),
         ("pbd", "high, larger dt", CONFIRMED),
-    ]  # fmt: skip
+    ]
     assert cells[0].measured == "largest stable dt 0.50 and 0.50 d/c; mean default dt 0.0001 s"
     assert cells[2].measured == "largest stable dt >= 2.00 and 2.00 d/c; mean default dt 0.0001 s"
     assert all(len(c.runs) == 2 for c in cells)
@@ -113,8 +120,12 @@ def test_cost_at_equal_spacing_and_at_equal_error():
     assert error[0].measured == "over the cheapest: no case that all three can run at several spacings"
     wide = {"mpm": [finished(wall_per_simulated_s=w) for w in (3.0, 5.0)]}
     assert cost(evidence(repeats=wide))[0].measured == "4 ± 1 wall s / simulated s"
-    rows = [trial(case(name), m, e, wall=f * w, spacing=0.01 * w) for name in ("dam_break", "bead_area")
-            for m, f in (("mpm", 2.0), ("sph", 3.0), ("pbd", 1.0)) for e, w in ((0.4, 1.0), (0.1, 9.0))]  # fmt: skip
+    rows = [
+        trial(case(name), m, e, wall=f * w, spacing=0.01 * w)
+        for name in ("dam_break", "bead_area")
+        for m, f in (("mpm", 2.0), ("sph", 3.0), ("pbd", 1.0))
+        for e, w in ((0.4, 1.0), (0.1, 9.0))
+    ]
     cells = cost(evidence([*rows, trial(case("other"), "mpm")]))[3:]
     assert [c.verdict for c in cells] == [CONFIRMED] * 3 and {len(c.runs) for c in cells} == {4}
     assert cells[0].measured == "over the cheapest: dam_break: x 2, bead_area: x 2"
@@ -164,8 +175,12 @@ def test_a_step_collapses_when_it_shrinks_tenfold(monkeypatch):
     assert cells["limits: viscosity"].measured == "dt 20 s at 0.001 Pa s, 2 s at 1000: 10-fold"
     assert cells["limits: yield stress"].measured == "dt 20 s at 0 Pa, 2 s at 10000: 9.99-fold"
     assert [c.paper for c in cells.values() if c.rule == "collapse"] == ["high viscosity", "non-Newtonian"]
-    assert seen == [("sph", ("material.viscosity", 1e-3)), ("sph", ("material.viscosity", 1e3)),
-                    ("sph", ("material.yield_stress", 0.0)), ("sph", ("material.yield_stress", 1e4))]  # fmt: skip
+    assert seen == [
+        ("sph", ("material.viscosity", 1e-3)),
+        ("sph", ("material.viscosity", 1e3)),
+        ("sph", ("material.yield_stress", 0.0)),
+        ("sph", ("material.yield_stress", 1e4)),
+    ]
 
 
 def test_a_bound_is_the_least_of_the_varied_scenario():
@@ -180,18 +195,28 @@ def test_a_bound_is_the_least_of_the_varied_scenario():
 
 def test_the_table_has_every_cell_and_says_nothing_where_nothing_ran():
     rows = known("mpm", 4, 0, "elastic")
-    cells = table1(evidence(rows, repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)))
-    assert {c.row for c in cells} >= {
-        "paradigm", "fidelity, liquids", "stability / dt", "cost at equal spacing", "cost at equal error", "best for",
-        "limits: memory", "limits: grid artifacts", "limits: viscosity", "limits: yield stress", "limits: accuracy",
-        "claim", "in both frameworks: claim",
-    }  # fmt: skip
-    assert CONFIRMED in {c.verdict for c in cells}
+    found = cells(evidence(rows, repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)))
+    assert {c.row for c in found} >= {
+        "paradigm",
+        "fidelity, liquids",
+        "stability / dt",
+        "cost at equal spacing",
+        "cost at equal error",
+        "best for",
+        "limits: memory",
+        "limits: grid artifacts",
+        "limits: viscosity",
+        "limits: yield stress",
+        "limits: accuracy",
+        "claim",
+        "in both frameworks: claim",
+    }
+    assert CONFIRMED in {c.verdict for c in found}
     for t in rows:
         t.runs, t.note = {}, SHIPPED
     dead = evidence(rows, repeats={m: [finished(m, "error")] for m in METHODS})
-    assert {c.verdict for c in table1(dead)} == {OPEN}
+    assert {c.verdict for c in cells(dead)} == {OPEN}
     half = evidence(rows, repeats={m: [finished(m, "error"), finished(m)] for m in METHODS})
-    assert CONFIRMED in {c.verdict for c in table1(half)}
+    assert CONFIRMED in {c.verdict for c in cells(half)}
     blown = evidence(rows, repeats={m: [finished(m, "diverged")] for m in METHODS})
-    assert CONFIRMED in {c.verdict for c in table1(blown)}
+    assert CONFIRMED in {c.verdict for c in cells(blown)}

@@ -6,25 +6,17 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from fluidbench.report import stability as stability_page
-from fluidbench.report import table1 as table1_page
-from fluidbench.report import table2 as table2_page
-from fluidbench.report.tables import (
-    Table,
-    against_reference,
-    backends,
-    costs,
-    failed_prints,
-    fidelity,
-    label,
-    number,
-    show,
-    spread,
-    successes,
-)
-from fluidbench.study.table2 import Row
+from fluidbench.measure.reference import Answer
+from fluidbench.measure.tower import Criterion, Print
+from fluidbench.paper import table1_report as table1_page
+from fluidbench.paper import table2_report as table2_page
+from fluidbench.paper.table2 import Row
+from fluidbench.report.table import Table, label, number, show, spread
+from fluidbench.study import stability_report as stability_page
+from fluidbench.study.compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
+from fluidbench.study.stability import AXES
 
-from .made import case, evidence, finished, known, repeated, trial
+from .made import case, change, evidence, finished, known, repeated, trial
 
 
 def test_numbers_have_four_digits_and_spreads_one():
@@ -60,23 +52,18 @@ def test_fidelity_has_a_column_a_method_and_hides_the_ledger():
     ] + [finished("sph", "diverged"), finished("sph", measures={"slump": 0.5}, repeat=1, print="broken")]
     table = fidelity(runs)
     assert table.head == ["", "mpm", "sph"] and table.rows == [
-        ["verdict", "completed", "completed, diverged"], ["print", "-", "broken"],
-        ["bead width [m]", "0.011 ± 0.001", "-"], ["slump", "-", "0.5"],
-    ]  # fmt: skip
+        ["verdict", "completed", "completed, diverged"],
+        ["print", "-", "broken"],
+        ["bead width [m]", "0.011 ± 0.001", "-"],
+        ["slump", "-", "0.5"],
+    ]
     assert [row[0] for row in fidelity(runs[:2]).rows] == ["verdict", "bead width [m]"]
     odd = fidelity([finished(measures={"potential_energy_J": 1.0, "angular_momentum_x_kg_m2_s": 1.0, "top_m": 1.0})])
     assert [row[0] for row in odd.rows] == ["verdict", "top [m]"]
 
 
-def answer(**more):
-    return {
-        "quantity": "q",
-        "measured": 1.2345678,
-        "reference": 2.0,
-        "error": 0.125,
-        "measure": "relative",
-        "source": "s",
-    } | more
+def answer(measure="relative"):
+    return Answer("q", 1.2345678, 2.0, 0.125, measure, "s")
 
 
 def test_errors_are_percents_but_where_they_are_absolute():
@@ -96,11 +83,14 @@ def test_errors_are_percents_but_where_they_are_absolute():
 
 def test_criteria_have_a_row_each():
     def criteria(*rows):
-        return [{"name": n, "measured": m, "wanted": ">= 1", "met": met} for n, m, met in rows]
+        return [Criterion(n, m, ">= 1", met, Print.COLLAPSED) for n, m, met in rows]
 
-    runs = [finished("mpm", success=criteria(("height", 0.51234, False), ("laid", 3, True))), finished("sph"),
-            finished("pbd", success=criteria(("height", 1.0, True), ("laid", 2, False))),
-            finished("pbd", success=criteria(("height", 9.0, True), ("laid", 9, False)), repeat=1)]  # fmt: skip
+    runs = [
+        finished("mpm", success=criteria(("height", 0.51234, False), ("laid", 3, True))),
+        finished("sph"),
+        finished("pbd", success=criteria(("height", 1.0, True), ("laid", 2, False))),
+        finished("pbd", success=criteria(("height", 9.0, True), ("laid", 9, False)), repeat=1),
+    ]
     table = successes(runs)
     assert table.head == ["", "wanted", "mpm", "pbd"]
     assert table.rows == [["height", ">= 1", "0.5123 NO", "1 yes"], ["laid", ">= 1", "3 yes", "2 NO"]]
@@ -108,9 +98,11 @@ def test_criteria_have_a_row_each():
 
 
 def test_prints_that_failed_are_told_with_what_they_did_not_meet():
-    unmet = [{"name": "height", "measured": 0.51234, "wanted": ">= 1", "met": False},
-             {"name": "laid", "measured": 3, "wanted": "3", "met": True},
-             {"name": "radius", "measured": 0.25, "wanted": "<= 0.1", "met": False}]  # fmt: skip
+    unmet = [
+        Criterion("height", 0.51234, ">= 1", False, Print.COLLAPSED),
+        Criterion("laid", 3, "3", True, Print.INCOMPLETE),
+        Criterion("radius", 0.25, "<= 0.1", False, Print.DEFORMED),
+    ]
     runs = [
         finished("mpm", print="collapsed", success=unmet),
         finished("sph", print="sound", success=unmet),
@@ -123,14 +115,20 @@ def test_prints_that_failed_are_told_with_what_they_did_not_meet():
     )
 
 
-COSTLY = {"substeps": 5, "particle_substeps_per_s": 1e4, "particle_substeps_per_cpu_s": 2e4, "peak_particles": 7,
-          "peak_memory_MiB": 3.0, "prepare_s": 0.5}  # fmt: skip
+COSTLY = {
+    "substeps": 5,
+    "particle_substeps_per_s": 1e4,
+    "particle_substeps_per_cpu_s": 2e4,
+    "peak_particles": 7,
+    "peak_memory_MiB": 3.0,
+    "prepare_s": 0.5,
+}
 
 
 def costly(method="mpm", verdict="completed", **more):
     run = finished(method, verdict, **more)
     if verdict == "completed":
-        run.record["cost"] |= COSTLY | {k: v for k, v in more.items() if k in COSTLY}
+        change(run, COSTLY | {k: v for k, v in more.items() if k in COSTLY})
     return run
 
 
@@ -149,18 +147,23 @@ def test_backends_are_compared_where_there_are_two():
     def pair(second=None, **more):
         measures = {"bead_width_m": 0.010, "layer_1_height_m": 0.005, "slump": 0.1, "resolution_m": 1e-3}
         first = [costly(measures=measures, particle_substeps_per_s=1e4 * k) for k in (1, 3)]
-        other = costly(measures=measures | {"bead_width_m": 0.0105, "layer_1_height_m": 0.0048, "slump": 0.9},
-                       backend="taichi", particle_substeps_per_s=5e4, **more)  # fmt: skip
+        other = costly(
+            measures=measures | {"bead_width_m": 0.0105, "layer_1_height_m": 0.0048, "slump": 0.9},
+            backend="taichi",
+            particle_substeps_per_s=5e4,
+            **more,
+        )
         return [*first, other]
 
     table = backends(pair(wall_s=4.0))
     assert table.head == ["", "warp", "taichi", "second / first"]
     assert table.rows == [
         ["mpm: particle substeps per s", "2e+04 ± 1e+04", "5e+04", "2.5"],
-        ["mpm: particle substeps per cpu s", "2e+04 ± 0", "2e+04", "1"], ["mpm: wall [s]", "1 ± 0", "4", "4"],
+        ["mpm: particle substeps per cpu s", "2e+04 ± 0", "2e+04", "1"],
+        ["mpm: wall [s]", "1 ± 0", "4", "4"],
         ["mpm: prepare [s]", "0.5 ± 0", "0.5", "1"],
         ["mpm: bead width [m], apart most", "0.01", "0.0105", "0.5 of the resolution"],
-    ]  # fmt: skip
+    ]
     assert backends(pair()[:2]) is None and backends([*pair()[:2], finished(verdict="error", backend="taichi")]) is None
 
 
@@ -194,21 +197,22 @@ def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
             for s in speeds
         ]
         for run in made:
-            run.record["cost"] |= {"peak_particles": 1234}
-            run.record.update(launches={"per_substep": 4}, bytes={"a": 10, "b": 32})
+            change(run, {"peak_particles": 1234}, launches={"per_substep": 4}, bytes={"a": 10, "b": 32})
         return made
 
     broken = [
         finished(verdict="error", key="k", folder=tmp_path / "r"),
         finished(verdict="timeout", key="k", folder=tmp_path / "r"),
     ]
-    rows = [Row("plain", None, "mpm", runs([90.0, 110.0], machine={"cores": "2"}), runs([40.0, 40.0])),
-            Row("expansion + curing + drone", 5000, "mpm", broken, [])]  # fmt: skip
+    rows = [
+        Row("plain", None, "mpm", runs([90.0, 110.0], machine={"cores": "2"}), runs([40.0, 40.0])),
+        Row("expansion + curing + drone", 5000, "mpm", broken, []),
+    ]
     made = table2_page.report(rows, tmp_path)
     assert made.tables[0].rows == [
-        ["plain", "mpm", "as needed", "1234", "0.2", "100 ± 14", "0.1 ± 0.014", "40 ± 0", "0.04 ± 0", "-"],
-        ["expansion + curing + drone", "mpm", "5000", "-", "-", "error, timeout", "-", "-", "-", "60.0"],
-    ]  # fmt: skip
+        ["plain", "mpm", "as needed", "1234", "0.2", "100 ± 14", "0.1 ± 0.014", "40 ± 0", "0.04 ± 0", "85"],
+        ["expansion + curing + drone", "mpm", "5000", "-", "-", "error, timeout", "-", "-", "-", "60"],
+    ]
     first, second = made.data.to_dict("records")
     assert (first["steps_per_s"], first["steps_per_s_pictures"], first["simulated_to_real"]) == (100.0, 40.0, 0.1)
     assert (first["repeats"], first["bytes"], first["launches_per_substep"], second["repeats"]) == (2, 42, 4, 0)
@@ -221,7 +225,6 @@ def test_the_page_of_the_table_counts_its_verdicts(tmp_path):
     rows = [*known("mpm", 4, 0, "elastic"), trial(case("g0", "elastic"), "mpm", spacing=0.02, wall=2.0)]
     e = evidence(rows, repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0))
     for run in e.runs():
-        run.record["key"] = "k"
         object.__setattr__(run, "folder", tmp_path / "runs" / "x")
     made = table1_page.report(e, tmp_path)
     cells = [row for row in made.tables[0].rows if not row[0].startswith("in both")]
@@ -236,18 +239,33 @@ def test_the_page_of_the_table_counts_its_verdicts(tmp_path):
 
 
 def test_the_page_of_stability_draws_limits_and_marks_what_has_none():
-    point = {"axis": "density", "method": "mpm", "verdict": "held", "reason": "", "dt_own_s": 1.0, "binding": "b",
-             "dt_lump_s": 2.0, "lump_limit_found": True, "dt_theory_s": 3.0, "dt_block_s": math.inf}  # fmt: skip
-    points = [point | {"value": 10.0}, point | {"value": 0.0, "lump_limit_found": False},
-              {"axis": "density", "method": "sph", "value": 5.0, "verdict": "refused", "reason": "no"}]  # fmt: skip
+    point = {
+        "axis": "density",
+        "method": "mpm",
+        "verdict": "held",
+        "reason": "",
+        "dt_own_s": 1.0,
+        "binding": "b",
+        "dt_lump_s": 2.0,
+        "lump_limit_found": True,
+        "dt_theory_s": 3.0,
+        "dt_block_s": math.inf,
+    }
+    points = [
+        point | {"value": 10.0},
+        point | {"value": 0.0, "lump_limit_found": False},
+        {"axis": "density", "method": "sph", "value": 5.0, "verdict": "refused", "reason": "no"},
+    ]
     assert stability_page._points(points).rows == [
         ["density", "10", "mpm", "held", "1", "b", "2", "-", "3"],
         ["density", "0", "mpm", "held", "1", "b", "> 2", "-", "3"],
         ["density", "5", "sph", "refused", "-", "-", "-", "-", "-"],
     ]
-    (plot,) = stability_page._maps(points)
+    (plot,) = stability_page._maps(points, AXES)
     assert [(t.label, list(t.x), list(t.y)) for t in plot.traces] == [
-        ("mpm", [10.0], [2.0]), ("mpm, theory", [10.0], [3.0]), ("mpm, own bound", [10.0], [1.0]),
-    ]  # fmt: skip
+        ("mpm", [10.0], [2.0]),
+        ("mpm, theory", [10.0], [3.0]),
+        ("mpm, own bound", [10.0], [1.0]),
+    ]
     block = {"kind": "acoustic", "method": "mpm", "dt_limit_s": 3.0, "dt_theory_s": 4.0, "dt_own_s": 1.5}
     assert stability_page._blocks([block]).rows == [["acoustic", "mpm", "3", "4", "0.75", "0.5"]]

@@ -3,20 +3,24 @@
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.library import load
-from fluidbench.study import table2 as table2_module
-from fluidbench.study.table2 import Row, check_pools, claims, spread, table2
-from fluidbench.study.verdicts import CONFIRMED, OPEN, REFUTED
-from fluidbench.target import Target
+from fluidbench.method.target import Target
+from fluidbench.paper.table2 import VARIANTS, Row, check_pools, claims, spread, table2
+from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
+from fluidbench.scenario.library import load
 
-from .made import finished
+from .made import finished, working
 
 TAICHI = Target(backend="taichi")
 
 
 def row(variant, bare, filmed=(), pool=None):
-    return Row(variant, pool, "mpm", [finished(steps_per_s=s, simulated_to_real=s / 100) for s in bare],
-               [finished(steps_per_s=s, simulated_to_real=s / 100) for s in filmed])  # fmt: skip
+    return Row(
+        variant,
+        pool,
+        "mpm",
+        [finished(steps_per_s=s, simulated_to_real=s / 100) for s in bare],
+        [finished(steps_per_s=s, simulated_to_real=s / 100) for s in filmed],
+    )
 
 
 def said(rows):
@@ -41,8 +45,9 @@ ALL = "expansion + curing + drone"
 def test_curing_is_modest_below_twofold_and_expansion_a_fifth_more(curing, expansion, verdict):
     rows = [row("plain", [90.0, 110.0]), row("curing", [curing, curing]), row("expansion", [expansion] * 2)]
     assert said(rows)[MODEST] == (
-        f"steps/s fall {100 / curing:.2f}-fold with curing, {100 / expansion:.2f}-fold with expansion", verdict
-    )  # fmt: skip
+        f"steps/s fall {100 / curing:.2f}-fold with curing, {100 / expansion:.2f}-fold with expansion",
+        verdict,
+    )
     assert MODEST not in said(rows[:2]) and ORDER not in said(rows)
 
 
@@ -50,8 +55,9 @@ def test_the_drone_is_the_slowest_and_pictures_halve():
     names = ["plain", "curing", "expansion", "expansion + curing", ALL]
     rows = [row(n, [s, s]) for n, s in zip(names, (90.0, 80.0, 70.0, 60.0, 50.0), strict=True)]
     assert said(rows)[ORDER] == (
-        "steps/s: plain 90, curing 80, expansion 70, expansion + curing 60, expansion + curing + drone 50", CONFIRMED
-    )  # fmt: skip
+        "steps/s: plain 90, curing 80, expansion 70, expansion + curing 60, expansion + curing + drone 50",
+        CONFIRMED,
+    )
     assert said([row("plain", [40.0, 40.0]), *rows[1:]])[ORDER][1] == REFUTED
     assert RENDER not in said(rows)
     for share, verdict in ((0.49, CONFIRMED), (0.5, REFUTED), (0.9, REFUTED)):
@@ -80,40 +86,61 @@ def test_a_pools_size_needs_two_pools_and_two_repeats():
 
 
 def test_claims_are_of_the_last_pool():
-    rows = [row(n, [s] * 2, pool=p) for p, last in ((1, 10.0), (2, 60.0)) for n, s in
-            (("plain", 100.0), ("curing", 90.0), ("expansion", last))]  # fmt: skip
+    rows = [
+        row(n, [s] * 2, pool=p)
+        for p, last in ((1, 10.0), (2, 60.0))
+        for n, s in (("plain", 100.0), ("curing", 90.0), ("expansion", last))
+    ]
     assert said(rows)[MODEST][0].endswith("1.67-fold with expansion")
 
 
-def test_rows_of_the_tower_are_run_bare_and_filmed(monkeypatch):
-    calls = []
-
-    def execute(planned, store, hooks):
-        calls.append(planned)
-        return [finished(j.method) for j in planned]
-
-    monkeypatch.setattr(table2_module, "execute", execute)
-    rows = table2(["mpm"], [None], 3, True, None, None, Target(), 9.0)
+def test_rows_of_the_tower_are_run_bare_and_filmed(tmp_path, monkeypatch):
+    calls = working(monkeypatch)
+    more = {"quick": True, "out": tmp_path, "wall_limit": 9.0, "progress": False}
+    made = table2(["mpm"], pools=[None], repeats=3, **more)
+    rows = made.rows
     assert len(rows) == 5 and {r.method for r in rows} == {"mpm"} and {r.pool for r in rows} == {None}
-    assert [len(call) for call in calls] == [3] * 10
-    for call in calls:
-        assert [j.repeat for j in call] == [0, 1, 2] and {j.wall_limit for j in call} == {9.0}
-    assert [call[0].film_every for call in calls] == [None, 0.033] * 5
-    assert [call[0].variant for call in calls] == ["", "pictures"] * 5  # a filmed run is another run
-    names = [call[0].scenario["name"] for call in calls]
-    assert names[::2] == names[1::2] == [
-        "ring_tower", "ring_tower_curing", "ring_tower_expansion", "ring_tower_expansion_curing", "ring_tower_drone",
-    ]  # fmt: skip
+    (call,) = calls
+    assert len(call) == 30 and call.workers == 1 and {j.wall_limit for j in call} == {9.0}
+    assert [j.repeat for j in call] == [0, 1, 2] * 10
+    assert [j.film_every for j in call[::3]] == [None, 0.033] * 5
+    assert [j.variant for j in call[::3]] == ["", "pictures"] * 5  # a filmed run is another run
+    names = [j.scenario["name"] for j in call[::3]]
+    assert (
+        names[::2]
+        == names[1::2]
+        == [
+            "ring_tower",
+            "ring_tower_curing",
+            "ring_tower_expansion",
+            "ring_tower_expansion_curing",
+            "ring_tower_drone",
+        ]
+    )
     assert [len(r.bare) for r in rows] == [len(r.filmed) for r in rows] == [3] * 5
-    assert calls[0][0].scenario == load("ring_tower", quick=True).model_dump(mode="json")
-    sized = table2(["mpm", "sph"], [None, 400_000], 1, True, None, None, Target(), 9.0)
+    assert made.runs == [run for r in rows for run in (*r.bare, *r.filmed)] and (made.ok, made.missing) == (True, [])
+    assert call[0].scenario == load("ring_tower", quick=True).model_dump(mode="json")
+    sized = table2(["mpm", "sph"], pools=[None, 400_000], repeats=1, **more).rows
     assert [(r.method, r.pool) for r in sized[::5]] == [
         ("mpm", None),
         ("mpm", 400_000),
         ("sph", None),
         ("sph", 400_000),
     ]
-    assert calls[-1][0].scenario["pool"] == 400_000 and calls[-1][0].method == "sph"
+    assert calls[-1][-1].scenario["pool"] == 400_000 and calls[-1][-1].method == "sph"
+
+
+def test_each_row_gets_the_runs_that_it_asked_for(tmp_path, monkeypatch):
+    """Of several pools and repeats: bare ones without pictures, and all of its own variant and repeat."""
+    working(
+        monkeypatch,
+        lambda job: finished(job.method, scenario=job.scenario["name"], repeat=job.repeat, film_every=job.film_every),
+    )
+    rows = table2(["mpm"], pools=[None, 400_000], repeats=2, quick=True, out=tmp_path, progress=False).rows
+    for r in rows:
+        for runs, every in ((r.bare, None), (r.filmed, 0.033)):
+            seen = [(run.record.scenario, run.record.repeat, run.record.film_every) for run in runs]
+            assert seen == [(VARIANTS[r.variant], 0, every), (VARIANTS[r.variant], 1, every)]
 
 
 def test_speeds_of_a_row_and_their_spread():

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fluidbench.toolpath import Toolpath, Track
+from fluidbench.scenario.toolpath import Toolpath, Track
 
 # An L of two legs, 3 m and 4 m, at 2 m/s; 1 s of pause after the first of two layers, 0.5 m high.
-ELL = Toolpath(
-    kind="polyline", points=((1, 1), (4, 1), (4, 5)), speed=2.0, layers=2, layer_height=0.5, pause=1.0
-)  # fmt: skip
+ELL = Toolpath(kind="polyline", points=((1, 1), (4, 1), (4, 5)), speed=2.0, layers=2, layer_height=0.5, pause=1.0)
 TRACK = Track.of(ELL, floor=10.0, standoff=0.25)
 
 
@@ -19,8 +17,13 @@ def test_a_polyline_there_and_back_with_a_pause():
     assert ELL.length() == 7.0
     assert TRACK.time.tolist() == [0.0, 1.5, 3.5, 4.5, 6.5, 8.0]
     assert TRACK.position.tolist() == [
-        [1, 1, 10.25], [4, 1, 10.25], [4, 5, 10.25], [4, 5, 10.75], [4, 1, 10.75], [1, 1, 10.75],
-    ]  # fmt: skip
+        [1, 1, 10.25],
+        [4, 1, 10.25],
+        [4, 5, 10.25],
+        [4, 5, 10.75],
+        [4, 1, 10.75],
+        [1, 1, 10.75],
+    ]
     assert TRACK.extruding.tolist() == [0.0, 1.5, 3.5, 3.5, 5.5, 7.0]
     assert TRACK.layer.tolist() == [0, 0, 0, 1, 1]
     assert TRACK.end == 8.0
@@ -35,10 +38,19 @@ def test_places_between_knots_and_beyond_both_ends():
 @pytest.mark.parametrize(
     ("time", "velocity"),
     [
-        (0.0, (2, 0)), (1.4999, (2, 0)), (1.5, (0, 2)), (3.4999, (0, 2)), (3.5, (0, 0)), (4.4999, (0, 0)),
-        (4.5, (0, -2)), (6.5, (-2, 0)), (7.9999, (-2, 0)), (8.0, (0, 0)), (9.0, (0, 0)),
+        (0.0, (2, 0)),
+        (1.4999, (2, 0)),
+        (1.5, (0, 2)),
+        (3.4999, (0, 2)),
+        (3.5, (0, 0)),
+        (4.4999, (0, 0)),
+        (4.5, (0, -2)),
+        (6.5, (-2, 0)),
+        (7.9999, (-2, 0)),
+        (8.0, (0, 0)),
+        (9.0, (0, 0)),
     ],
-)  # fmt: skip
+)
 def test_velocity_changes_at_corners_and_is_zero_in_pauses_and_after_the_end(time, velocity):
     assert TRACK.velocity(time) == pytest.approx([*velocity, 0.0])
 
@@ -70,9 +82,7 @@ def test_every_second_layer_of_an_open_path_goes_back():
 
 
 def test_a_fixed_nozzle_feeds_for_its_dwell_on_every_layer():
-    path = Toolpath(
-        kind="line", start=(1, 2), end=(5, 5), speed=0.0, dwell=3.0, layers=2, layer_height=0.1, pause=0.5
-    )  # fmt: skip
+    path = Toolpath(kind="line", start=(1, 2), end=(5, 5), speed=0.0, dwell=3.0, layers=2, layer_height=0.1, pause=0.5)
     track = Track.of(path, 0.0, 0.2)
     assert track.time.tolist() == [0.0, 3.0, 3.5, 6.5] and track.extruding.tolist() == [0.0, 3.0, 3.0, 6.0]
     assert track.position[:, :2].tolist() == [[1, 2], [1, 2], [5, 5], [5, 5]]  # open paths go back and forth

@@ -7,29 +7,11 @@ import pytest
 
 from fluidbench.measure import tower
 from fluidbench.measure.tower import layer_of, measure_tower
-from fluidbench.particles import CARRIED, CLAMPED, FREE
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 
 from ..conftest import scenario
+from .made import DIAMETER, PASTE, RATE, RING, RISE, tower_of, wall
 
-DIAMETER, RISE, D = 0.0128, 0.009, 1.5e-3
-RATE = 0.1 * math.pi * DIAMETER**2 / 4  # at 0.1 m/s
-PASTE = {"density": 1000.0, "youngs_modulus": 2e4, "yield_stress": 200.0}
-
-
-def tower_of(toolpath, material=PASTE, spacing=D, **more):
-    base = {"speed": 0.1, "layers": 3, "layer_height": RISE, "pause": 0.1}
-    return scenario(
-        domain={"lower": [-0.6, -0.6, -0.01], "upper": [1.6, 0.6, 0.06]}, bodies=[], material=material,
-        nozzle={"diameter": DIAMETER, "exit_speed": 0.1, "standoff": 0.01}, toolpath={**base, **toolpath},
-        spacing=spacing, duration=20.0, **more,
-    )  # fmt: skip
-
-
-def wall(length=0.2, **more):
-    return tower_of({"kind": "wall", "start": [0.0, 0.0], "end": [length, 0.0]}, **more)
-
-
-RING = tower_of({"kind": "ring", "center": [0.1, -0.2], "radius": 0.05})
 ELL = tower_of({"kind": "polyline", "points": [[0.0, 0.0], [0.3, 0.0], [0.3, 0.1]]})
 
 
@@ -114,8 +96,12 @@ def test_quantiles_are_of_mass():
 
 def frame(position, birth, mass=1.0, held=FREE, **more):
     n = len(position)
-    columns = {"position": np.array(position, float), "mass": np.broadcast_to(mass, n).astype(float),
-               "birth_time": np.broadcast_to(birth, n).astype(float), "held": np.broadcast_to(held, n)}  # fmt: skip
+    columns = {
+        "position": np.array(position, float),
+        "mass": np.broadcast_to(mass, n).astype(float),
+        "birth_time": np.broadcast_to(birth, n).astype(float),
+        "held": np.broadcast_to(held, n),
+    }
     return columns | {key: np.broadcast_to(value, n).astype(float) for key, value in more.items()}
 
 

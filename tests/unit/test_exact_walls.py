@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.scene import FRICTION, PERIODIC, SLIP, STICK, Box, Scene
+from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Box, Scene
 from solvers import corrected, neighbours
 from solvers.corrected import least_eigenvalue, mirrored_stress, symmetric_inverse
 from solvers.neighbours import (
@@ -46,10 +46,17 @@ def code_of(*choices):
 
 @wp.kernel
 def look(
-    b: Box, x: wp.vec3, v: wp.vec3, g: wp.mat33, near: wp.vec3i, code: wp.array(dtype=int),
+    b: Box,
+    x: wp.vec3,
+    v: wp.vec3,
+    g: wp.mat33,
+    near: wp.vec3i,
+    code: wp.array(dtype=int),
     # outputs
-    vectors: wp.array2d(dtype=wp.vec3), matrices: wp.array2d(dtype=wp.mat33), numbers: wp.array2d(dtype=int),
-):  # fmt: skip
+    vectors: wp.array2d(dtype=wp.vec3),
+    matrices: wp.array2d(dtype=wp.mat33),
+    numbers: wp.array2d(dtype=int),
+):
     """Everything that image codes mean, as integers of the device understand them."""
     i = wp.tid()
     c = code[i]
@@ -67,8 +74,14 @@ def look(
 
 
 @wp.kernel
-def invert(b: Box, m: wp.array(dtype=wp.mat33), r: wp.array(dtype=wp.vec3), inverse: wp.array(dtype=wp.mat33),
-           least: wp.array(dtype=float), way: wp.array(dtype=wp.vec3)):  # fmt: skip
+def invert(
+    b: Box,
+    m: wp.array(dtype=wp.mat33),
+    r: wp.array(dtype=wp.vec3),
+    inverse: wp.array(dtype=wp.mat33),
+    least: wp.array(dtype=float),
+    way: wp.array(dtype=wp.vec3),
+):
     i = wp.tid()
     inverse[i] = symmetric_inverse(m[i])
     least[i] = least_eigenvalue(m[i])
@@ -82,8 +95,12 @@ def seen(b, *codes, near=(7, 7, 7)):
     """(vectors, matrices, numbers) of each code, see `look`."""
     n = len(codes)
     out = [wp.zeros((n, 3), dtype=wp.vec3), wp.zeros((n, 2), dtype=wp.mat33), wp.zeros((n, 9), dtype=int)]
-    wp.launch(look, n, [b, wp.vec3(*X), wp.vec3(*V), wp.mat33(*GRADIENT.ravel()), wp.vec3i(*near),
-                        wp.array(codes, dtype=int)], out)  # fmt: skip
+    wp.launch(
+        look,
+        n,
+        [b, wp.vec3(*X), wp.vec3(*V), wp.mat33(*GRADIENT.ravel()), wp.vec3i(*near), wp.array(codes, dtype=int)],
+        out,
+    )
     return [array.numpy() for array in out]
 
 
@@ -161,9 +178,14 @@ def test_particles_stay_in_front_of_walls_and_wrap():
 
 def test_faces_that_are_near_and_codes_that_use_them():
     b = box(SLIP, PERIODIC, SLIP)
-    for x, periodic, bits in (((0.05, -0.9, 4.0), False, (5, 4, 4)), ((0.05, -0.9, 4.0), True, (4, 5, 4)),
-                              ((0.95, 1.9, 6.9), False, (6, 4, 6)), ((0.95, 1.9, 6.9), True, (4, 6, 4)),
-                              ((0.5, 0.0, 4.0), False, (4, 4, 4)), ((0.3, 0.0, 4.0), False, (4, 4, 4))):  # fmt: skip
+    for x, periodic, bits in (
+        ((0.05, -0.9, 4.0), False, (5, 4, 4)),
+        ((0.05, -0.9, 4.0), True, (4, 5, 4)),
+        ((0.95, 1.9, 6.9), False, (6, 4, 6)),
+        ((0.95, 1.9, 6.9), True, (4, 6, 4)),
+        ((0.5, 0.0, 4.0), False, (4, 4, 4)),
+        ((0.3, 0.0, 4.0), False, (4, 4, 4)),
+    ):
         assert tuple(near_faces(b, wp.vec3(*x), 0.2, periodic)) == bits
     assert tuple(near_faces(b, wp.vec3(0.5, 0.0, 4.0), 0.6, False)) == (7, 4, 4)
 
@@ -222,6 +244,12 @@ def test_the_stiffness_of_a_bond_is_the_mean_of_its_ends():
 
 
 def test_what_rubs_on_a_face():
-    table = {(FRICTION, 0.9, False): True, (FRICTION, 1.1, False): False, (STICK, 0.9, False): False,
-             (STICK, 0.9, True): True, (SLIP, 0.9, True): False, (STICK, 1.1, True): False}  # fmt: skip
+    table = {
+        (FRICTION, 0.9, False): True,
+        (FRICTION, 1.1, False): False,
+        (STICK, 0.9, False): False,
+        (STICK, 0.9, True): True,
+        (SLIP, 0.9, True): False,
+        (STICK, 1.1, True): False,
+    }
     assert {key: bool(walls.rubbing(int(key[0]), key[1], 1.0, key[2])) for key in table} == table

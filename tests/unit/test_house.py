@@ -29,7 +29,18 @@ def test_toolkit_never_imports_a_method(path):
         assert not [n for n in names if n.split(".")[0] == "solvers"]
 
 
-@pytest.mark.parametrize("module", ["fluidbench", "fluidbench.cli", "fluidbench.scenario", "fluidbench.solver"])
+@pytest.mark.parametrize("path", python_files("fluidbench"), ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_room_but_the_papers_names_a_method(path):
+    """What a study must know of a method, the method says; the command line's defaults are words for people."""
+    if path.parts[-2] in ("paper", "engines", "cli") or path.name == "__init__.py":
+        return
+    constants = [n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)]
+    assert not {"mpm", "sph", "pbd"} & {value for value in constants if isinstance(value, str)}
+
+
+@pytest.mark.parametrize(
+    "module", ["fluidbench", "fluidbench.cli", "fluidbench.scenario.scenario", "fluidbench.native.solver"]
+)
 def test_heavy_packages_stay_unloaded(module):
     code = f"import sys, {module}; print([m for m in ('warp', 'pandas', 'matplotlib', 'plotly') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -73,9 +73,12 @@ def test_nothing_deposited_measures_nothing():
 def test_ledger_sums_in_double_precision():
     n = 1000
     frame = {
-        "held": np.zeros(n, int), "mass": np.full(n, 1e-3, np.float32), "position": np.ones((n, 3), np.float32),
-        "velocity": np.full((n, 3), 2.0, np.float32), "spin": np.zeros((n, 3)),
-    }  # fmt: skip
+        "held": np.zeros(n, int),
+        "mass": np.full(n, 1e-3, np.float32),
+        "position": np.ones((n, 3), np.float32),
+        "velocity": np.full((n, 3), 2.0, np.float32),
+        "spin": np.zeros((n, 3)),
+    }
     row = ledger(frame, bead())
     assert row["mass_kg"] == pytest.approx(1.0) and row["momentum_x_kg_m_s"] == pytest.approx(2.0)
     assert row["kinetic_energy_J"] == pytest.approx(6.0) and row["potential_energy_J"] == pytest.approx(9.81)

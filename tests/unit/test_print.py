@@ -6,7 +6,7 @@ import pytest
 
 from fluidbench.measure.ledger import lengths
 from fluidbench.measure.tower import SECTORS, SHORTEST, Print, measure_tower, success, verdict_of
-from fluidbench.particles import CARRIED, FREE
+from fluidbench.method.frame import CARRIED, FREE
 
 from ..conftest import scenario
 
@@ -17,26 +17,45 @@ WIDTH = np.pi / 4 * DIAMETER**2 / RISE  # a layer as wide as its material fills:
 def wall(length, spacing, **more):
     """Three layers back and forth over one line."""
     return scenario(
-        domain={"lower": [-0.03, -0.03, 0.0], "upper": [length + 0.03, 0.03, 0.06]}, bodies=[],
+        domain={"lower": [-0.03, -0.03, 0.0], "upper": [length + 0.03, 0.03, 0.06]},
+        bodies=[],
         material={"density": 1000.0, "youngs_modulus": 2e4, "yield_stress": 200.0},
         nozzle={"diameter": DIAMETER, "exit_speed": 0.1, "standoff": 0.01},
-        toolpath={"kind": "wall", "start": [0.0, 0.0], "end": [length, 0.0], "speed": 0.1, "layers": LAYERS,
-                  "layer_height": RISE, "pause": 0.1},
-        spacing=spacing, duration=3 * length / 0.1 + 1.0, **more,
-    )  # fmt: skip
+        toolpath={
+            "kind": "wall",
+            "start": [0.0, 0.0],
+            "end": [length, 0.0],
+            "speed": 0.1,
+            "layers": LAYERS,
+            "layer_height": RISE,
+            "pause": 0.1,
+        },
+        spacing=spacing,
+        duration=3 * length / 0.1 + 1.0,
+        **more,
+    )
 
 
 def ring(radius, spacing):
     """Three closed rings."""
     reach = radius + 0.03
     return scenario(
-        domain={"lower": [-reach, -reach, 0.0], "upper": [reach, reach, 0.06]}, bodies=[],
+        domain={"lower": [-reach, -reach, 0.0], "upper": [reach, reach, 0.06]},
+        bodies=[],
         material={"density": 1000.0, "youngs_modulus": 2e4, "yield_stress": 200.0},
         nozzle={"diameter": DIAMETER, "exit_speed": 0.1, "standoff": 0.01},
-        toolpath={"kind": "ring", "center": [0.0, 0.0], "radius": radius, "speed": 0.1, "layers": LAYERS,
-                  "layer_height": RISE, "pause": 0.1},
-        spacing=spacing, duration=3 * 2 * np.pi * radius / 0.1 + 1.0,
-    )  # fmt: skip
+        toolpath={
+            "kind": "ring",
+            "center": [0.0, 0.0],
+            "radius": radius,
+            "speed": 0.1,
+            "layers": LAYERS,
+            "layer_height": RISE,
+            "pause": 0.1,
+        },
+        spacing=spacing,
+        duration=3 * 2 * np.pi * radius / 0.1 + 1.0,
+    )
 
 
 def lattice(low, high, spacing):
@@ -69,19 +88,32 @@ def built(s, ideal=True):
 def judged(s, points, volume, births, before=None):
     """(verdict, measures, criteria) of particles as they are at the end of the print."""
     frame = {
-        "position": points, "velocity": np.zeros_like(points), "mass": np.full(len(points), 1000.0 * volume),
-        "volume": np.full(len(points), volume), "held": np.full(len(points), FREE), "birth_time": births,
-        "origin": np.arange(len(points)), "phase": np.zeros(len(points), int), "spin": np.zeros_like(points),
-    }  # fmt: skip
+        "position": points,
+        "velocity": np.zeros_like(points),
+        "mass": np.full(len(points), 1000.0 * volume),
+        "volume": np.full(len(points), volume),
+        "held": np.full(len(points), FREE),
+        "birth_time": births,
+        "origin": np.arange(len(points)),
+        "phase": np.zeros(len(points), int),
+        "spin": np.zeros_like(points),
+    }
     measures = lengths(frame, s) | measure_tower(frame, s)
     rows = [{"time_s": t, **lengths(frame if before is None else before, s)} for t in (0.0, s.track.end)]
     series = pd.DataFrame([*rows, {"time_s": s.duration, **measures}])
     criteria = success(s, measures, series)
-    return verdict_of(criteria), measures, {c["name"]: c for c in criteria}
+    return verdict_of(criteria), measures, {c.name: c for c in criteria}
 
 
-SCENARIOS = [wall(0.2, 1.5e-3), wall(0.08, 1.5e-3), wall(0.08, 3e-3), wall(0.2, 4.5e-3), wall(1.0, 6e-3),
-             ring(0.06, 1.5e-3), ring(0.1, 4e-3)]  # fmt: skip
+SCENARIOS = [
+    wall(0.2, 1.5e-3),
+    wall(0.08, 1.5e-3),
+    wall(0.08, 3e-3),
+    wall(0.2, 4.5e-3),
+    wall(1.0, 6e-3),
+    ring(0.06, 1.5e-3),
+    ring(0.1, 4e-3),
+]
 every_print = pytest.mark.parametrize(
     "s", SCENARIOS, ids=lambda s: f"{s.toolpath.kind}-{s.toolpath.length():.2g}-{s.spacing}"
 )
@@ -92,7 +124,7 @@ def test_a_sound_print_is_sound_and_as_high_as_it_is(s):
     verdict, measures, criteria = judged(s, *built(s))
     assert verdict is Print.SOUND, criteria
     assert measures["print_height_m"] == pytest.approx(LAYERS * RISE, abs=0.26 * s.spacing)
-    assert criteria["continuity of the worst layer"]["measured"] == 1.0
+    assert criteria["continuity of the worst layer"].measured == 1.0
     for k in range(LAYERS):
         assert measures[f"layer_{k + 1}_level_m"] == pytest.approx((k + 0.5) * RISE, abs=0.51 * s.spacing)
         assert measures[f"layer_{k + 1}_width_m"] == pytest.approx(WIDTH, abs=1.2 * s.spacing)
@@ -116,7 +148,7 @@ def test_one_stray_particle_changes_nothing(s):
     verdict, measures, criteria = judged(s, stray, volume, births)
     assert verdict is Print.SOUND
     for name, criterion in criteria.items():
-        assert criterion["measured"] == pytest.approx(plain[2][name]["measured"], abs=0.02, nan_ok=True)
+        assert criterion.measured == pytest.approx(plain[2][name].measured, abs=0.02, nan_ok=True)
     fallen = points * [1.0, 1.0, 0.3]
     fallen[0] = stray[0]
     verdict, measures, _ = judged(s, fallen, volume, births)
@@ -137,9 +169,9 @@ def test_a_gap_in_a_layer_breaks_the_print(s, left):
     inside = (births < s.track.time[np.flatnonzero(s.track.layer == 1)[0]]) & (abs(share - 0.5) < gap / 2)
     keep = ~inside | (np.random.default_rng(2).random(len(points)) < left)
     verdict, _, criteria = judged(s, points[keep], volume, births[keep])
-    assert verdict is not Print.SOUND and not criteria["continuity of the worst layer"]["met"]
+    assert verdict is not Print.SOUND and not criteria["continuity of the worst layer"].met
     sectors = min(SECTORS, middle * path.length() / (SHORTEST * s.spacing))
-    assert criteria["continuity of the worst layer"]["measured"] == pytest.approx(1.0 - gap / middle, abs=2.0 / sectors)
+    assert criteria["continuity of the worst layer"].measured == pytest.approx(1.0 - gap / middle, abs=2.0 / sectors)
 
 
 @every_print
@@ -151,7 +183,7 @@ def test_half_of_a_print_that_fell_has_collapsed(s):
     fallen[half, 2] *= 0.25
     verdict, _, criteria = judged(s, fallen, volume, births)
     assert verdict is Print.COLLAPSED
-    assert criteria["share of the path that stands"]["measured"] == pytest.approx(0.5, abs=0.12)
+    assert criteria["share of the path that stands"].measured == pytest.approx(0.5, abs=0.12)
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.7])
@@ -160,17 +192,22 @@ def test_a_print_that_sank_evenly_has_collapsed(factor):
     points, volume, births = built(s)
     verdict, _, criteria = judged(s, points * [1, 1, factor], volume, births)
     assert verdict is Print.COLLAPSED
-    assert criteria["height over plan"]["measured"] == pytest.approx(factor, abs=0.03)
+    assert criteria["height over plan"].measured == pytest.approx(factor, abs=0.03)
 
 
 def test_a_print_that_stands_but_sinks_is_deformed():
     s = SCENARIOS[1]
     points, volume, births = built(s)
-    fresh = {"position": points, "volume": np.full(len(points), volume), "mass": np.full(len(points), volume * 1000.0),
-             "held": np.full(len(points), FREE), "phase": np.zeros(len(points), int)}  # fmt: skip
+    fresh = {
+        "position": points,
+        "volume": np.full(len(points), volume),
+        "mass": np.full(len(points), volume * 1000.0),
+        "held": np.full(len(points), FREE),
+        "phase": np.zeros(len(points), int),
+    }
     verdict, _, criteria = judged(s, points * [1, 1, 0.9], volume, births, before=fresh)
     assert verdict is Print.DEFORMED
-    assert criteria["sunk after the last layer"]["measured"] == pytest.approx(0.1, abs=0.01)
+    assert criteria["sunk after the last layer"].measured == pytest.approx(0.1, abs=0.01)
 
 
 def test_a_ring_that_spreads_is_deformed_and_its_radius_is_told():
@@ -178,8 +215,8 @@ def test_a_ring_that_spreads_is_deformed_and_its_radius_is_told():
     points, volume, births = built(s)
     wide = points * [1.15, 1.15, 1.0]
     _, _, criteria = judged(s, wide, volume, births)
-    assert criteria["worst radius error"]["measured"] == pytest.approx(0.15, abs=0.005)
-    assert not criteria["worst radius error"]["met"]
+    assert criteria["worst radius error"].measured == pytest.approx(0.15, abs=0.005)
+    assert not criteria["worst radius error"].met
 
 
 def test_a_missing_layer_is_incomplete_whatever_else_holds():
@@ -192,6 +229,10 @@ def test_a_missing_layer_is_incomplete_whatever_else_holds():
 def test_what_is_still_in_the_nozzle_belongs_to_no_layer():
     s = SCENARIOS[1]
     points, volume, births = built(s)
-    frame = {"position": points, "mass": np.full(len(points), volume), "birth_time": births,
-             "held": np.where(points[:, 2] > 2 * RISE, CARRIED, FREE)}  # fmt: skip
+    frame = {
+        "position": points,
+        "mass": np.full(len(points), volume),
+        "birth_time": births,
+        "held": np.where(points[:, 2] > 2 * RISE, CARRIED, FREE),
+    }
     assert "layer_3_level_m" not in measure_tower(frame, s) and "layer_2_level_m" in measure_tower(frame, s)

@@ -8,18 +8,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from fluidbench.cure import Cure
 from fluidbench.errors import UserError
-from fluidbench.expansion import LARGEST, Expansion
-from fluidbench.layout import capacity_of
-from fluidbench.library import validate
-from fluidbench.material import Material
+from fluidbench.scenario.cure import Cure
+from fluidbench.scenario.expansion import LARGEST, Expansion
+from fluidbench.scenario.layout import capacity_of
+from fluidbench.scenario.library import validate
+from fluidbench.scenario.material import Material
 from solvers.constitutive import relieved
 
 KINDS = {
-    "jump": {}, "stages": {"time": 2.0}, "linear": {"time": 2.0}, "first_order": {"rate": 0.7},
-    "kamal_sourour": {"rate": 0.1, "rate_autocatalytic": 2.0}, "avrami": {"rate": 0.5, "exponent": 2.5},
-}  # fmt: skip
+    "jump": {},
+    "stages": {"time": 2.0},
+    "linear": {"time": 2.0},
+    "first_order": {"rate": 0.7},
+    "kamal_sourour": {"rate": 0.1, "rate_autocatalytic": 2.0},
+    "avrami": {"rate": 0.5, "exponent": 2.5},
+}
 
 
 def cure(kind, **more):
@@ -79,10 +83,17 @@ def test_a_liquid_that_cures_to_a_solid_must_say_its_bulk_modulus():
 
 def ball(**more):
     return validate(
-        {"name": "ball", "domain": {"lower": [-1, -1, -1], "upper": [1, 1, 1]}, "duration": 1.0, "spacing": 0.01,
-         "bodies": [{"kind": "box", "center": [0, 0, 0], "size": [0.1, 0.1, 0.1]}],
-         "material": {"density": 100, "youngs_modulus": 1e3, "expansion": {"ratio": 10.0}}, **more}, "ball",
-    )  # fmt: skip
+        {
+            "name": "ball",
+            "domain": {"lower": [-1, -1, -1], "upper": [1, 1, 1]},
+            "duration": 1.0,
+            "spacing": 0.01,
+            "bodies": [{"kind": "box", "center": [0, 0, 0], "size": [0.1, 0.1, 0.1]}],
+            "material": {"density": 100, "youngs_modulus": 1e3, "expansion": {"ratio": 10.0}},
+            **more,
+        },
+        "ball",
+    )
 
 
 def test_a_pool_too_small_for_the_offspring_is_refused_before_the_run():

@@ -12,7 +12,7 @@ from fluidbench.measure.profiles import (
     semi_axes,
     sine_amplitude,
     widest_diameter,
-)  # fmt: skip
+)
 from fluidbench.scenario import Domain
 from solvers.mpm.grid import cells_of
 

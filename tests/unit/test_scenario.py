@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fluidbench.errors import UserError
-from fluidbench.layout import sample
-from fluidbench.library import load, parse_override, shipped, validate
-from fluidbench.material import Material
-from fluidbench.timestep import Bound, damped_limit, plan
-from fluidbench.toolpath import Toolpath, Track
+from fluidbench.method.timestep import Bound, damped_limit, plan
+from fluidbench.scenario.layout import sample
+from fluidbench.scenario.library import load, parse_override, shipped, validate
+from fluidbench.scenario.material import Material
+from fluidbench.scenario.toolpath import Toolpath, Track
 
 from ..conftest import bead, scenario
 
@@ -139,9 +139,12 @@ def test_sound_speed_follows_the_fastest_expected_speed():
 
 def test_wave_and_gradient_add_to_the_velocity():
     body = {
-        "kind": "box", "center": [0.1, 0.1, 0.1], "size": [0.1, 0.1, 0.1], "velocity": [1.0, 0.0, 0.0],
+        "kind": "box",
+        "center": [0.1, 0.1, 0.1],
+        "size": [0.1, 0.1, 0.1],
+        "velocity": [1.0, 0.0, 0.0],
         "wave": {"amplitude": [0.0, 2.0, 0.0], "number": [0.0, 0.0, 10.0], "phase": 0.5},
-    }  # fmt: skip
+    }
     made = scenario(bodies=[body]).bodies[0]
     at = made.velocity_at(np.array([[0.1, 0.1, 0.13]]))
     assert np.allclose(at, [[1.0, 2.0 * np.sin(0.8), 0.0]])

@@ -1,25 +1,18 @@
 """The rules of the studies: bisection, extrapolation, ranking, verdicts, changes."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fluidbench.cli.app import budget_of, fraction
+from fluidbench.cli.options import budget_of, fraction
 from fluidbench.errors import UserError
-from fluidbench.library import load
-from fluidbench.solver import approximations, configure, get_solver, refusal
-from fluidbench.study.ablate import Change, changes, effect
-from fluidbench.study.case import Finding, cases
-from fluidbench.study.evidence import Evidence
-from fluidbench.study.execute import Finished
-from fluidbench.study.frameworks import frameworks
-from fluidbench.study.limits import bisect, block, block_limit, default_dt
-from fluidbench.study.select import assess, confidence, trust_of
-from fluidbench.study.stability import AXES, choose, measure_point, point_tasks, theory, varied
-from fluidbench.study.validate import Trial
-from fluidbench.study.verdicts import (
+from fluidbench.method.suitability import approximations, refusal
+from fluidbench.method.target import HERE
+from fluidbench.method.timestep import lost_speed
+from fluidbench.paper.evidence import Evidence
+from fluidbench.paper.frameworks import frameworks
+from fluidbench.paper.verdicts import (
     CONFIRMED,
     DIFFERS,
     HOLDS,
@@ -32,8 +25,17 @@ from fluidbench.study.verdicts import (
     share_within,
     winners,
 )
-from fluidbench.target import HERE
-from fluidbench.timestep import lost_speed
+from fluidbench.registry import get_method
+from fluidbench.scenario.library import load
+from fluidbench.scenario.numerics import configure
+from fluidbench.study.ablate import Change, changes, effect
+from fluidbench.study.case import Finding, cases
+from fluidbench.study.limits import bisect, block, block_limit, default_dt
+from fluidbench.study.select import assess, confidence, trust_of
+from fluidbench.study.stability import choose, measure_point, point_tasks, varied
+from fluidbench.study.validate import Trial
+
+from .made import finished
 
 
 @pytest.mark.parametrize("limit", [1e-5, 3.3e-3, 0.2])
@@ -49,39 +51,42 @@ def test_bisection_says_when_no_limit_was_reached():
 
 
 def test_a_block_of_mpm_has_the_limit_of_theory():
-    """1.27 to 1.31 dx / c (validation H), within the 20 % that other features may cost."""
-    solver = get_solver("mpm")
+    """1.27 to 1.31 dx / c (references.md, H), within the 20 % that other features may cost."""
+    solver = get_method("mpm")
     config, scenario = solver.Config(), block({"density": 1000.0, "sound_speed": 10.0}, 0.01)
     own, _ = default_dt(scenario, solver, config)
     found = block_limit(scenario, solver, config, own, 0.1, HERE)
-    assert found.dt == pytest.approx(theory("mpm", scenario, config), rel=0.2)
+    assert found.dt == pytest.approx(get_method("mpm").theory(scenario, config), rel=0.2)
     assert found.dt * 10.0 / 0.02 == pytest.approx(1.29, rel=0.2)
 
 
-@pytest.mark.parametrize("name", AXES)
-def test_every_axis_makes_valid_points_or_refuses(name):
-    scenario = load("line_bead")
-    tasks = point_tasks(scenario, choose([name]), ["mpm"], True, HERE)
-    assert tasks
-    for _, task in tasks:
-        try:
-            assert varied(task["scenario"], task["settings"]) is not None
-        except UserError as error:
-            assert str(error)
+@pytest.mark.parametrize("name", choose([], ["mpm"]))
+def test_every_axis_makes_scenarios_that_have_its_values(name):
+    tasks = point_tasks(load("line_bead"), choose([name], ["mpm"]), ["mpm"], False, HERE)
+    values = choose([name], ["mpm"])[name].values
+    assert len(tasks) == len(values)
+    for (_, task), value in zip(tasks, values, strict=True):
+        ((key, wanted),) = task["settings"].items()
+        found = varied(task["scenario"], task["settings"]).model_dump()
+        for part in key.split("."):
+            found = found[part]
+        assert found == pytest.approx(wanted) and task["value"] == value
+        by = {
+            "spacing": value * load("line_bead").spacing,
+            "particles_per_cell": value ** (1 / 3),
+        }  # 8 in a cell of 2 d
+        assert wanted == pytest.approx(by.get(name, value))
 
 
 def test_a_point_beyond_its_sound_is_refused_with_the_reason():
-    task = point_tasks(load("line_bead"), choose(["exit_speed"]), ["sph"], True, HERE)[-1][1]
+    task = point_tasks(load("line_bead"), choose(["exit_speed"], ["sph"]), ["sph"], True, HERE)[-1][1]
     row = measure_point(task)
     assert row["verdict"] == "refused" and "too near its own sound" in row["reason"]
 
 
 def record(method, spacing, **measures):
-    cost = {"mean_dt_s": 1e-4, "wall_s": spacing**-4, "wall_per_simulated_s": spacing**-4, "cpu_s": spacing**-4}
-    return Finished(
-        {"verdict": "completed", "method": method, "device": "cpu", "backend": "warp", "spacing_m": spacing,
-         "measures": measures, "answers": [], "cost": cost}, Path("nowhere"), False,
-    )  # fmt: skip
+    wall = spacing**-4
+    return finished(method, spacing=spacing, measures=measures, wall_s=wall, wall_per_simulated_s=wall, cpu_s=wall)
 
 
 def test_selection_extrapolates_and_knows_the_bias():
@@ -144,7 +149,7 @@ def test_resolutions_that_disagree_leave_a_verdict_open():
 def test_a_step_too_small_for_single_precision_is_refused():
     """At dt = 1e-8 s a particle 0.1 m from the origin must move at 0.4 m/s to move at all."""
     assert lost_speed(1e-8, 0.1) == pytest.approx(0.5 * 2.0**-27 / 1e-8)
-    solver, scenario = get_solver("mpm"), load("line_bead", ["material.viscosity=1e6"])
+    solver, scenario = get_method("mpm"), load("line_bead", ["material.viscosity=1e6"])
     reason = refusal(solver, scenario, configure(solver, scenario))
     assert reason is not None and "single precision" in reason and "viscous" in reason
     still = block({"density": 1000.0, "sound_speed": 0.05, "viscosity": 1e5}, 0.01)  # an experiment on stability
@@ -189,15 +194,13 @@ def test_options_are_read_or_refused():
         with pytest.raises(UserError, match="takes a"):
             budget_of(wrong)
     with pytest.raises(UserError, match="did you mean 'viscosity'"):
-        choose(["viscocity"])
+        choose(["viscocity"], ["mpm"])
 
 
 def run_at(method, backend, pace, repeat):
-    cost = {"wall_per_simulated_s": pace * (1.0 + 0.001 * repeat), "wall_s": pace}
-    return Finished(
-        {"verdict": "completed", "method": method, "device": "cpu", "backend": backend, "repeat": repeat, "cost": cost},
-        Path("nowhere"), False,
-    )  # fmt: skip
+    return finished(
+        method, backend=backend, repeat=repeat, wall_per_simulated_s=pace * (1 + 0.001 * repeat), wall_s=pace
+    )
 
 
 def paces(backend, **by_method):

@@ -5,10 +5,10 @@ import math
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.solver import solver_names
+from fluidbench.method.target import HERE
+from fluidbench.registry import method_names
 from fluidbench.study.case import Finding, cases, select
 from fluidbench.study.validate import EXEMPT, LEVELS, MISS, PASS, SKIPPED, Trial, _judge, orders, plan
-from fluidbench.target import HERE
 
 every_case = pytest.mark.parametrize("case", cases().values(), ids=lambda c: c.name)
 
@@ -17,7 +17,7 @@ every_case = pytest.mark.parametrize("case", cases().values(), ids=lambda c: c.n
 def test_a_case_is_complete(case):
     """Source, measure and tolerance are there, and what is said of methods is said of known ones."""
     assert case.source and case.measure and case.tolerance > 0
-    assert set(case.exempt) | set(case.skipped) | set(case.causes) <= set(solver_names())
+    assert set(case.exempt) | set(case.skipped) | set(case.causes) <= set(method_names())
     assert (case.drive is None) == (case.scenarios is not None) == (case.evaluate is not None)
 
 
@@ -54,7 +54,7 @@ def test_order_is_the_slope_over_the_spacings():
 def test_plan_skips_with_a_reason_and_quick_leaves_out_the_dear():
     (skipped,) = plan([cases()["pbd_stiffness"]], ["mpm"], ["coarse"], False, HERE, None)
     assert skipped.verdict == SKIPPED and skipped.note and not skipped.jobs
-    quick = plan(list(cases().values()), solver_names(), ["coarse"], True, HERE, None)
+    quick = plan(list(cases().values()), method_names(), ["coarse"], True, HERE, None)
     assert {t.case.physics for t in quick} >= {"liquid", "viscous", "yield stress", "elastic", "emission"}
     assert all(t.method not in t.case.exempt for t in quick)
 
