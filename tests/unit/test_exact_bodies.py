@@ -106,7 +106,7 @@ def test_points_are_taken_as_they_are(tmp_path):
     assert body.top_speed == pytest.approx(np.linalg.norm([6, 7, 9]))
     laid = lay_out(body, s)
     assert laid.position == pytest.approx(x[:2]) and laid.volume == pytest.approx(w[:2])
-    assert laid.velocity == pytest.approx(v[:2] + [0, 0, 1])
+    assert laid.velocity == pytest.approx(v[:2] + np.array([0.0, 0.0, 1.0]))
     scene = Scene(s)
     pool = Pool(scene, 2)
     Placement(s, pool)
