@@ -115,7 +115,7 @@ def execute(
         for k, i in enumerate(places[place]):
             if k or executor is not None:
                 hooks.started(i, planned[i], got.reused or k > 0)
-            results[i] = Run(got.result, folder, reused) if isinstance(got.result, Record) else got.result
+            results[i] = Run(got.result, folder, reused, store.keeper) if isinstance(got.result, Record) else got.result
             done += 1
             hooks.ended(i, results[i])
 

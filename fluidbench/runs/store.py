@@ -59,11 +59,12 @@ def read_record(folder: Path, name: str = RECORD) -> tuple[dict[str, Any] | None
 class Store:
     """The output folder of a study; it comes into being with the first result.
 
-    With `fresh` nothing that was there before is reused.
+    With `fresh` nothing that was there before is reused. `keeper` keeps a temporary folder as long as somebody holds
+    it.
     """
 
-    def __init__(self, root: Path, fresh: bool = False) -> None:
-        self.root, self.fresh = root, fresh
+    def __init__(self, root: Path, fresh: bool = False, keeper: Any = None) -> None:
+        self.root, self.fresh, self.keeper = root, fresh, keeper
         self.made: set[Path] = set()  # folders of runs that were made on this store's behalf
         try:
             _try_to_write(root)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -68,7 +68,7 @@ def compare(
         film_every=render_every,
         checkpoint_every=checkpoint_every,
     )
-    runs = [replace(run, keeper=place.keeper) for run in place.run(planned, verb)]
+    runs = place.run(planned, verb)
     ok = any(run.ok for run in runs) and not lacking(runs, refusals=False)
     return Comparison(report_of(runs, place.store.root, verb), place.store.root, runs, ok=ok, keeper=place.keeper)
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
+import shutil
 import tempfile
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -49,6 +52,14 @@ class Options(TypedDict, total=False):
     progress: bool
 
 
+class Scratch:
+    """A temporary folder that is there as long as somebody holds this."""
+
+    def __init__(self) -> None:
+        self.folder = tempfile.mkdtemp(prefix="fluidbench-")
+        weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
+
+
 @dataclass
 class Workplace:
     """Options that were found to be possible."""
@@ -60,12 +71,17 @@ class Workplace:
     executor: Any = None
     progress: bool = True
     gpus: tuple[str, ...] = ()  # to share out, where there are several
-    keeper: Any = None  # keeps a temporary folder as long as somebody holds it
 
     @classmethod
     def of(cls, options: Options, wall_limit: float, methods: Sequence[str] = ()) -> Workplace:
-        """Raises UserError for a device, a backend or a folder that is not there, and for a method that lacks the
-        backend; nothing is written."""
+        """Raises UserError for an option, a device, a backend or a folder that is not there, and for a method without
+        the backend; nothing is written."""
+        for name in options:
+            if name not in Options.__annotations__:
+                raise UserError(f"no option {quoted(name)}{suggestion(name, Options.__annotations__)}")
+        limit = options.get("wall_limit", wall_limit)
+        if not 0 < limit < math.inf:
+            raise UserError(f"wall_limit: a positive number of seconds is wanted (got {limit:g})")
         device = options.get("device", "cpu")
         gpus = visible_gpus() if device == "cuda" else ()
         device = "cuda:0" if device == "cuda" else device
@@ -77,13 +93,17 @@ class Workplace:
             check_executor(executor)
         elif executor is not None:
             executor = as_executor(executor)
-        keeper = None
-        if (out := options.get("out")) is None:
-            keeper = tempfile.TemporaryDirectory(prefix="fluidbench-", ignore_cleanup_errors=True)
-            out = keeper.name
-        store = Store(Path(out).absolute(), options.get("fresh", False))
-        limit = options.get("wall_limit", wall_limit)
-        return cls(target, store, workers, limit, executor, options.get("progress", True), gpus, keeper)
+        out, keeper = options.get("out"), None
+        if out is None:
+            keeper = Scratch()
+            out = keeper.folder
+        store = Store(Path(out).absolute(), options.get("fresh", False), keeper)
+        return cls(target, store, workers, limit, executor, options.get("progress", True), gpus)
+
+    @property
+    def keeper(self) -> Any:
+        """Keeps a temporary folder as long as somebody holds it."""
+        return self.store.keeper
 
     def run(self, planned: Sequence[Work], title: str, together: bool = False, line: Line | None = None) -> list[Any]:
         """Have work done and shown: one piece at a time, so that times mean something, unless it may run `together`."""

@@ -88,6 +88,7 @@ def working(monkeypatch, answer=lambda work: finished(work.method)):
         for run in made:
             if isinstance(run, Run):
                 object.__setattr__(run, "folder", store.root / "runs" / "x")
+                object.__setattr__(run, "keeper", store.keeper)
         return made
 
     monkeypatch.setattr(workplace, "execute", execute)

@@ -2,6 +2,7 @@
 
 import gc
 import json
+import math
 from io import StringIO
 from pathlib import Path
 
@@ -215,10 +216,20 @@ def test_runs_without_a_folder_live_as_long_as_they_are_held(monkeypatch):
     gc.collect()
     root = run.folder.parents[1]
     assert root.is_dir() and root.name.startswith("fluidbench-")
-    with pytest.warns(ResourceWarning, match="Implicitly cleaning up"):
-        del run
-        gc.collect()
+    del run
+    gc.collect()
     assert not root.exists()
+
+
+def test_options_that_there_are_not_are_refused():
+    for given, words in (
+        ({"wall_limt": 3}, "no option 'wall_limt'; did you mean 'wall_limit'"),
+        ({"wall_limit": -1.0}, r"a positive number of seconds is wanted \(got -1\)"),
+        ({"wall_limit": math.nan}, "a positive number"),
+        ({"repeats": 0}, "at least 1 is wanted"),
+    ):
+        with pytest.raises(UserError, match=words):
+            module.compare(BEAD, ["mpm"], **given)
 
 
 def test_a_workplace_is_checked_before_anything_is_written(tmp_path):
