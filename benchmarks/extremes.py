@@ -22,7 +22,7 @@ from fluidbench.scenario import Scenario
 from fluidbench.scenario.library import load
 from fluidbench.scenario.numerics import configure
 from fluidbench.study.limits import default_dt, lump
-from fluidbench.study.stability import AXES, varied
+from fluidbench.study.points import AXES, varied
 
 METHODS = ("mpm", "sph", "pbd")
 BEYOND = 10.0  # factor by which values may lie beyond an axis' own ends

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ..runs.record import Run
-from ..study.validate import Trial
+from ..study.trials import Trial
 from .evidence import Evidence
 
 

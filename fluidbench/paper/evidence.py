@@ -15,8 +15,8 @@ from ..runs.record import Run
 from ..scenario import Scenario
 from ..scenario.numerics import configure
 from ..study.case import Case, Finding, cases
-from ..study.stability import ERROR, Spacing, measure_points, point_tasks, varied
-from ..study.validate import Trial
+from ..study.points import ERROR, Spacing, measure_points, point_tasks, varied
+from ..study.trials import Trial
 from ..study.workplace import Workplace
 
 METHODS = ("mpm", "sph", "pbd")

@@ -14,7 +14,7 @@ from . import PAPER
 from .cells import Cell
 from .evidence import Evidence
 from .frameworks import IN_BOTH
-from .table1 import cells as judged
+from .judged import cells as judged
 from .verdicts import OPEN, RULES
 
 if TYPE_CHECKING:

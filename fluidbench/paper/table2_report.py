@@ -9,7 +9,7 @@ from statistics import mean
 from ..report.report import Report, machine_of, record_link
 from ..report.table import Table
 from . import PAPER as TITLE
-from .table2 import Row, claims, published, spread
+from .rows import Row, claims, published, spread
 
 
 def report(rows: Sequence[Row], root: Path) -> Report:

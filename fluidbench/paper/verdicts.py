@@ -12,7 +12,7 @@ from statistics import mean, stdev
 import numpy as np
 
 from ..method.verdict import Evidence
-from ..study.validate import Trial
+from ..study.trials import Trial
 from .evidence import COST_CASES, METHODS
 
 CONFIRMED, REFUTED, OPEN = "confirmed", "refuted", "not decidable"

@@ -9,7 +9,7 @@ from ..report.plot import Plot, Trace, colour
 from ..report.report import Report, record_link
 from ..report.table import Table
 from ..scenario import Scenario
-from .ablate import WORTH, Ablation, Effect, command
+from .ablation import WORTH, Ablation, Effect, command
 
 
 def verdict(seen: Effect, tolerance: float) -> str:

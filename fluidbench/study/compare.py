@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,16 +12,15 @@ from ..method.suitability import check_backend
 from ..method.target import DEFAULT_BACKEND, Target
 from ..method.verdict import lacking
 from ..registry import get_method
-from ..report.report import Report
 from ..runs.job import CHECKPOINTS, Job
-from ..runs.record import Record, Run
+from ..runs.record import Run
 from ..scenario import Scenario
 from ..scenario.numerics import configure
+from .compare_report import report
 from .result import Result
 from .workplace import Options, Workplace, as_scenario, methods_of, targets_of
 
 WALL_LIMIT = 900.0  # s
-LENGTHS = ("bead_width_m", "bead_height_m", "bead_area_m2", "slump", "spread_radius_m", "front_x_m", "height_m")
 
 
 @dataclass(repr=False)
@@ -70,7 +68,7 @@ def compare(
     )
     runs = place.run(planned, verb)
     ok = any(run.ok for run in runs) and not lacking(runs, refusals=False)
-    return Comparison(report_of(runs, place.store.root, verb), place.store.root, runs, ok=ok, keeper=place.keeper)
+    return Comparison(report(runs, place.store.root, verb), place.store.root, runs, ok=ok, keeper=place.keeper)
 
 
 def run(scenario: Scenario | str | Path, method: str, **more: Any) -> Run:
@@ -81,12 +79,6 @@ def run(scenario: Scenario | str | Path, method: str, **more: Any) -> Run:
     Raises UserError for what cannot be run, before anything is.
     """
     return compare(scenario, [method], **more).runs[0]
-
-
-def report_of(runs: Sequence[Run], root: Path, verb: str) -> Report:
-    from .compare_report import report
-
-    return report(runs, root, verb)
 
 
 def jobs(
@@ -106,10 +98,3 @@ def jobs(
         for target in targets
         for repeat in range(repeats)
     ]
-
-
-def lengths_of(record: Record) -> dict[str, float]:
-    """The lengths, areas and slumps of a finished run: what a printer cares about."""
-    found = record.measures
-    layers = [key for key in found if key.startswith("layer_") and key.endswith(("height_m", "width_m", "radius_m"))]
-    return {key: found[key] for key in (*LENGTHS, *layers) if math.isfinite(found.get(key, math.nan))}

@@ -11,7 +11,7 @@ from ..measure.tower import Print
 from ..method.verdict import Evidence, evidence_of
 from ..report.table import Table, label, number, spread
 from ..runs.record import Record, Run
-from ..study.compare import lengths_of
+from .lengths import lengths_of
 
 if TYPE_CHECKING:
     pass

@@ -10,7 +10,7 @@ from ..report.plot import Plot, Trace, colour
 from ..report.report import Report, machine_of, record_link
 from ..report.table import Table, number
 from ..scenario import Scenario
-from .select import Candidate, Selection, confidence, physics_of
+from .selection import Candidate, Selection, confidence, physics_of
 
 GREY = "#bbbbbb"
 

@@ -10,8 +10,8 @@ from ..report.plot import Plot, Trace, colour
 from ..report.report import Report
 from ..report.table import Table, number
 from ..scenario import Scenario
-from .stability import Axis, findings
-from .validate import Trial
+from .points import Axis, findings
+from .trials import Trial
 
 Row = dict[str, Any]
 

@@ -13,7 +13,7 @@ from ..report.plot import Plot, Trace, colour
 from ..report.report import Report, Section, machine_of
 from ..report.table import Table, number
 from .case import METHOD_OF_LAW, Case, Curve
-from .validate import Trial, orders, tidy
+from .trials import Trial, orders, shown_error, tidy
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,19 +33,6 @@ ANSWERS = (
 """Columns of known_answers.csv."""
 
 
-def line(trial: Trial) -> str:
-    """One trial in a line."""
-    note = f"  ({trial.note})" if trial.note else ""
-    return (
-        f"{trial.case.name:<20} {trial.method:<4} d = {trial.spacing:<9.3g} error {_error(trial.error):>9} of "
-        f"{trial.tolerance:<7.3g} {trial.verdict}{note}"
-    )
-
-
-def _error(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.3g}"
-
-
 def summary(trials: Sequence[Trial]) -> Table:
     """Case, method, spacing, error, tolerance, order, cost and verdict, one row a trial."""
     slopes = orders(trials)
@@ -61,10 +48,10 @@ def summary(trials: Sequence[Trial]) -> Table:
                 t.method,
                 number(t.spacing),
                 f"{t.cost.get('particles', 0):.0f}",
-                _error(t.error),
+                shown_error(t.error),
                 number(t.tolerance),
                 "-" if math.isnan(slope) else f"{slope:.2f} ({spacings})",
-                _error(t.cost.get("wall_per_simulated_s", math.nan)),
+                shown_error(t.cost.get("wall_per_simulated_s", math.nan)),
                 t.verdict,
             ]
         )

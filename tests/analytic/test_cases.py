@@ -5,7 +5,7 @@ import pytest
 
 from fluidbench.method.target import HERE
 from fluidbench.study.case import cases
-from fluidbench.study.validate import EXEMPT, MISS, PASS, plan, run
+from fluidbench.study.trials import EXEMPT, MISS, PASS, plan, run
 from fluidbench.study.workplace import Workplace
 
 from ..conftest import NATIVE

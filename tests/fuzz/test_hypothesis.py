@@ -16,7 +16,7 @@ from fluidbench.registry import method_names
 from fluidbench.scenario import Scenario
 from fluidbench.scenario.library import assign, load, parse_override, validate
 from fluidbench.study.case import select
-from fluidbench.study.stability import choose
+from fluidbench.study.points import choose
 from fluidbench.study.workplace import targets_of
 
 from .harness import fluidbench, nothing_runs

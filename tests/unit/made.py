@@ -16,7 +16,7 @@ from fluidbench.runs.store import Store
 from fluidbench.scenario.library import load
 from fluidbench.study import workplace
 from fluidbench.study.case import Case, Finding
-from fluidbench.study.validate import SKIPPED, Trial
+from fluidbench.study.trials import SKIPPED, Trial
 from fluidbench.study.workplace import Workplace
 
 from ..conftest import scenario

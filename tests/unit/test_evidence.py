@@ -9,9 +9,9 @@ from fluidbench.method.verdict import Evidence as Weight
 from fluidbench.method.verdict import Verdict, evidence_of, lacking
 from fluidbench.paper.cells import figures
 from fluidbench.paper.evidence import METHODS, Evidence
-from fluidbench.paper.table1 import cells, claims, fidelity
-from fluidbench.paper.table2 import Row
-from fluidbench.paper.table2 import claims as claims2
+from fluidbench.paper.judged import cells, claims, fidelity
+from fluidbench.paper.rows import Row
+from fluidbench.paper.rows import claims as claims2
 from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED, at_equal_error, share_within, told, winners
 from fluidbench.runs import execute as execution
 from fluidbench.runs import job as job_module
@@ -21,11 +21,11 @@ from fluidbench.runs.job import Job
 from fluidbench.runs.record import Record, keep
 from fluidbench.runs.store import Store, read_record, write_record
 from fluidbench.scenario.library import load
-from fluidbench.study import select as selection
+from fluidbench.study import selection
 from fluidbench.study.case import Finding, cases
-from fluidbench.study.select import Candidate, Selection, Trust, _unconverged, assess, confidence
 from fluidbench.study.select_report import _further
-from fluidbench.study.validate import Trial
+from fluidbench.study.selection import Candidate, Selection, Trust, _unconverged, assess, confidence
+from fluidbench.study.trials import Trial
 
 from .made import finished
 

@@ -5,20 +5,10 @@ import math
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.study import ablate as module
 from fluidbench.study import ablate_report as page
-from fluidbench.study.ablate import (
-    Ablation,
-    Change,
-    Effect,
-    ablate,
-    ablation,
-    changes,
-    command,
-    economies,
-    effect,
-    features,
-)
+from fluidbench.study import ablation as module
+from fluidbench.study.ablate import ablate
+from fluidbench.study.ablation import Ablation, Change, Effect, ablation, changes, command, economies, effect, features
 
 from ..conftest import scenario
 from .made import BEAD, change, finished, working, workplace_in

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from fluidbench.paper.evidence import SHIPPED
-from fluidbench.paper.table1 import bead_width, claims, grid_artifacts, physical_accuracy, prediction
+from fluidbench.paper.judged import bead_width, claims, grid_artifacts, physical_accuracy, prediction
 from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
 
 from .made import case, evidence, finished, known, repeated, trial

@@ -3,8 +3,9 @@
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.paper import table2 as module
-from fluidbench.paper.table2 import VARIANTS, table2
+from fluidbench.paper import rows as module
+from fluidbench.paper.rows import VARIANTS
+from fluidbench.paper.table2 import table2
 from fluidbench.study import stability_report as stability_page
 
 from ..conftest import scenario

@@ -11,7 +11,8 @@ from fluidbench.paper.evidence import METHODS
 from fluidbench.paper.frameworks import frameworks
 from fluidbench.paper.verdicts import DIFFERS, HOLDS, OPEN
 from fluidbench.study import compare_report
-from fluidbench.study.compare import jobs, lengths_of
+from fluidbench.study.compare import jobs
+from fluidbench.study.lengths import lengths_of
 
 from .made import BEAD, case, change, evidence, finished, repeated, trial
 

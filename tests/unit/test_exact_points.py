@@ -10,9 +10,9 @@ from fluidbench.method.contract import Steps
 from fluidbench.method.target import Target
 from fluidbench.method.vitals import Vital
 from fluidbench.registry import get_method
-from fluidbench.study import limits, stability
+from fluidbench.study import limits, points, stability
 from fluidbench.study.limits import Limit, default_dt
-from fluidbench.study.stability import (
+from fluidbench.study.points import (
     AXES,
     BLOCKS,
     block_material,
@@ -99,7 +99,7 @@ def test_the_opening_is_two_thousand_substeps_or_all(monkeypatch, ticks, each, t
 
     made = []
     monkeypatch.setattr(get_method("mpm"), "start", Opened)
-    assert stability.opening(s, "mpm", Target()) == ("boom" if trouble_at else None)
+    assert points.opening(s, "mpm", Target()) == ("boom" if trouble_at else None)
     assert made[0].looks == looked == made[0].done
 
 
@@ -147,7 +147,7 @@ def point(monkeypatch, method="mpm", quick=True, survive=lambda dt: None, block_
     monkeypatch.setattr(limits, "lump_survives", lump_survives)
     monkeypatch.setattr(limits, "block_limit", block_limit)
     monkeypatch.setattr(limits, "default_dt", lambda *_: (own, "acoustic"))
-    monkeypatch.setattr(stability, "opening", lambda *_: opening)
+    monkeypatch.setattr(points, "opening", lambda *_: opening)
     task = point_tasks(BEAD, choose(["density"], [method]), [method], quick, Target())[1][1]
     return measure_point(task), tried, asked
 
@@ -207,7 +207,7 @@ def test_crashes_are_rows_with_their_reason():
     assert measure_blocks(blocks, run) == [{"kind": "acoustic", "method": "mpm", "reason": "it died"}, results[1]]
     for (function, given), work in zip((("measure_point", tasks), ("measure_block", blocks)), asked, strict=True):
         assert [(w.label, w.task) for w in work] == given and {w.target for w in work} == {Target()}
-        assert {(w.function, w.method) for w in work} == {(f"fluidbench.study.stability:{function}", "mpm")}
+        assert {(w.function, w.method) for w in work} == {(f"fluidbench.study.points:{function}", "mpm")}
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typer import Exit
 
 from fluidbench.cli.app import finish
 from fluidbench.report.report import write
+from fluidbench.study import trials
 from fluidbench.study import validate_report as page
 from fluidbench.study.case import Curve, Finding, Number
 from fluidbench.study.validate import result_of
@@ -84,8 +85,8 @@ def test_the_published_table_has_a_row_a_trial():
 
 def test_a_line_says_error_tolerance_and_note():
     first, second, third, _ = known()
-    assert page.line(first).split() == ["drop", "mpm", "d", "=", "0.01", "error", "0.0421", "of", "0.1", "pass"]
-    assert page.line(second).endswith("MISS  (a|b)") and "error         - of" in page.line(third)
+    assert trials.line(first).split() == ["drop", "mpm", "d", "=", "0.01", "error", "0.0421", "of", "0.1", "pass"]
+    assert trials.line(second).endswith("MISS  (a|b)") and "error         - of" in trials.line(third)
 
 
 def test_results_are_written_with_their_numbers(tmp_path):

@@ -7,18 +7,17 @@ import pandas as pd
 import pytest
 
 from fluidbench.measure.reference import Answer
-from fluidbench.study import select as module
-from fluidbench.study.select import (
+from fluidbench.study import selection as module
+from fluidbench.study.select import candidates, select
+from fluidbench.study.selection import (
     Candidate,
     Fit,
     Selection,
     Trust,
     assess,
-    candidates,
     confidence,
     extrapolate,
     physics_of,
-    select,
     trust_of,
 )
 

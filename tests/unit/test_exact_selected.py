@@ -5,7 +5,7 @@ import math
 import pytest
 
 from fluidbench.study import select_report as page
-from fluidbench.study.select import Candidate, Selection, Trust
+from fluidbench.study.selection import Candidate, Selection, Trust
 
 from .made import BEAD, change, finished
 

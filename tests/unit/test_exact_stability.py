@@ -11,7 +11,7 @@ from fluidbench.method.vitals import Vital
 from fluidbench.registry import get_method
 from fluidbench.study import limits
 from fluidbench.study.limits import Limit, bisect, block, default_dt, lump
-from fluidbench.study.stability import BLOCKS
+from fluidbench.study.points import BLOCKS
 
 from ..conftest import bead, scenario
 

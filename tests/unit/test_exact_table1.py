@@ -2,9 +2,9 @@
 
 import pytest
 
-from fluidbench.paper import table1 as module
+from fluidbench.paper import judged as module
 from fluidbench.paper.evidence import METHODS, SHIPPED
-from fluidbench.paper.table1 import best_for, bound_dt, cells, cost, fidelity, limits, paradigm, stability
+from fluidbench.paper.judged import best_for, bound_dt, cells, cost, fidelity, limits, paradigm, stability
 from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
 from fluidbench.registry import get_method
 

@@ -10,11 +10,11 @@ from fluidbench.measure.reference import Answer
 from fluidbench.measure.tower import Criterion, Print
 from fluidbench.paper import table1_report as table1_page
 from fluidbench.paper import table2_report as table2_page
-from fluidbench.paper.table2 import Row
+from fluidbench.paper.rows import Row
 from fluidbench.report.table import Table, label, number, show, spread
 from fluidbench.study import stability_report as stability_page
 from fluidbench.study.compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
-from fluidbench.study.stability import AXES
+from fluidbench.study.points import AXES
 
 from .made import case, change, evidence, finished, known, repeated, trial
 

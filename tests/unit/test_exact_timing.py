@@ -4,7 +4,8 @@ import pytest
 
 from fluidbench.errors import UserError
 from fluidbench.method.target import Target
-from fluidbench.paper.table2 import VARIANTS, Row, check_pools, claims, spread, table2
+from fluidbench.paper.rows import VARIANTS, Row, check_pools, claims, spread
+from fluidbench.paper.table2 import table2
 from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
 from fluidbench.scenario.library import load
 

@@ -14,10 +14,10 @@ from fluidbench.files import write_parquet
 from fluidbench.method.target import Target
 from fluidbench.method.verdict import Evidence
 from fluidbench.report.progress import Display
+from fluidbench.study import trials, workplace
 from fluidbench.study import validate as module
-from fluidbench.study import workplace
 from fluidbench.study.case import Finding, case_in, cases, select
-from fluidbench.study.validate import LEVELS, Trial, evaluate, evaluate_law, orders, plan, tidy
+from fluidbench.study.trials import LEVELS, Trial, evaluate, evaluate_law, orders, plan, tidy
 
 from ..conftest import scenario
 from .made import case, change, finished, trial, workplace_in
@@ -91,7 +91,7 @@ def test_trials_are_planned_at_every_level():
 
 def judged(error, of=LIMITED, method="mpm"):
     made = trial(of, method, error)
-    module._judge(made)
+    trials._judge(made)
     return made.verdict, made.note
 
 
@@ -232,7 +232,7 @@ def test_a_trial_is_judged_with_its_last_run(tmp_path, monkeypatch):
     monkeypatch.setattr(workplace, "execute", execute)
     console = Console(file=StringIO(), width=200)
     monkeypatch.setattr(workplace, "Display", lambda *words, **more: Display(*words, **more, console=console))
-    module.run(rows, workplace_in(tmp_path, 3))
+    trials.run(rows, workplace_in(tmp_path, 3))
     assert told == [
         (1, "", "", "pass", "skipped"),
         (2, "", "", "pass", "skipped"),

@@ -28,12 +28,12 @@ from fluidbench.paper.verdicts import (
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import load
 from fluidbench.scenario.numerics import configure
-from fluidbench.study.ablate import Change, changes, effect
+from fluidbench.study.ablation import Change, changes, effect
 from fluidbench.study.case import Finding, cases
 from fluidbench.study.limits import bisect, block, block_limit, default_dt
-from fluidbench.study.select import assess, confidence, trust_of
-from fluidbench.study.stability import choose, measure_point, point_tasks, varied
-from fluidbench.study.validate import Trial
+from fluidbench.study.points import choose, measure_point, point_tasks, varied
+from fluidbench.study.selection import assess, confidence, trust_of
+from fluidbench.study.trials import Trial
 
 from .made import finished
 

@@ -8,7 +8,7 @@ from fluidbench.errors import UserError
 from fluidbench.method.target import HERE
 from fluidbench.registry import method_names
 from fluidbench.study.case import Finding, cases, select
-from fluidbench.study.validate import EXEMPT, LEVELS, MISS, PASS, SKIPPED, Trial, _judge, orders, plan
+from fluidbench.study.trials import EXEMPT, LEVELS, MISS, PASS, SKIPPED, Trial, _judge, orders, plan
 
 every_case = pytest.mark.parametrize("case", cases().values(), ids=lambda c: c.name)
 

@@ -1,0 +1,273 @@
+"""What `select` rests on: every candidate with its estimated error, and what is known of each method.
+
+A scenario without an exact answer gets its error estimated in three parts, all relative to a length:
+
+- discretisation: each length is extrapolated within a method to zero spacing at first order (what these methods show on
+  extrusion), by least squares over all spacings run, the finer ones counting more; the error at a spacing is the
+  distance to that limit, or the scatter about the fit from there down if that is larger;
+- bias: the distance of a method's limit from the consensus, the mean limit of the trusted methods;
+- trust: a method is trusted when it passes most known answers of the scenario's own physics
+  (scenarios/reference/known_answers.csv, made by `fluidbench validate`).
+
+A length with an exact answer (a bead's area) is judged against that alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..measure.reference import table as reference
+from ..method.verdict import lacking
+from ..runs.record import Run
+from ..scenario import Scenario
+from .lengths import lengths_of
+
+FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
+
+ENOUGH = 3  # spacings needed for an extrapolation
+
+NOISE = 0.01  # share of a length that its scatter may have without casting doubt on a fit
+
+FALLS = 0.5  # observed order from which an error counts as falling
+
+
+@dataclass(frozen=True)
+class Trust:
+    """How a method did on the known answers of the scenario's physics."""
+
+    passed: int
+    judged: int
+
+    @property
+    def trusted(self) -> bool:
+        return self.passed > 0.5 * self.judged
+
+
+@dataclass
+class Candidate:
+    """One method at one spacing: its cost, its estimated error and the parts of it."""
+
+    method: str
+    spacing: float
+    dt: float
+    wall: float
+    pace: float  # wall s per simulated s
+    discretisation: float
+    bias: float
+    run: Run
+
+    @property
+    def error(self) -> float:
+        return self.discretisation + self.bias
+
+
+@dataclass
+class Selection:
+    """Everything that the choice rests on."""
+
+    candidates: list[Candidate]
+    trust: dict[str, Trust]
+    limits: dict[str, dict[str, float]]
+    runs: list[Run]
+    notes: list[str] = field(default_factory=list)
+    erratic: set[str] = field(default_factory=set)  # methods with a length that no line through its spacings explains
+
+    def missing(self) -> list[str]:
+        """Runs that it wanted and has nothing of; that a method refuses is an answer."""
+        return lacking(self.runs, refusals=False)
+
+    def order(self, method: str) -> float:
+        """Least-squares slope of log error over log spacing of a method's candidates; NaN below ENOUGH of them."""
+        own = [c for c in self.candidates if c.method == method and c.discretisation > 0]
+        if len(own) < ENOUGH:
+            return math.nan
+        return float(np.polyfit(np.log([c.spacing for c in own]), np.log([c.discretisation for c in own]), 1)[0])
+
+    def converges(self, method: str) -> bool:
+        """Whether a method's error falls as it is refined: in all, and at the finest spacing once more."""
+        own = sorted((c for c in self.candidates if c.method == method), key=lambda c: c.spacing)
+        if len(own) < ENOUGH:
+            return False
+        falling = own[0].discretisation <= own[1].discretisation * (1.0 + 1e-9)
+        return falling and method not in self.erratic and (own[0].discretisation == 0 or self.order(method) > FALLS)
+
+    def front(self) -> list[Candidate]:
+        """The candidates that none beats in both cost and error, cheapest first."""
+        best, kept = math.inf, []
+        for c in sorted(self.candidates, key=lambda c: (c.wall, c.error)):
+            if c.error < best:
+                best = c.error
+                kept.append(c)
+        return kept
+
+    def recommend(self, tolerance: float, budget: float, pace: float) -> tuple[Candidate | None, str]:
+        """The cheapest within tolerance, wall time [s] and pace (wall s per simulated s); or the nearest, and why."""
+        good = [c for c in self.candidates if c.error <= tolerance]
+        affordable = [c for c in good if c.wall <= budget and c.pace <= pace]
+        if affordable:
+            return min(affordable, key=lambda c: c.wall), ""
+        if good:
+            return min(good, key=lambda c: c.wall), "nothing within the tolerance meets the budget; this is the fastest"
+        if self.candidates:
+            return min(self.candidates, key=lambda c: c.error), "nothing tried meets the tolerance; this is the nearest"
+        return None, "no method completed at three spacings"
+
+
+def physics_of(scenario: Scenario) -> set[str]:
+    """The classes of known answers that the scenario's material and process belong to."""
+    m = scenario.material
+    classes = {"emission"} if scenario.nozzle is not None else set()
+    if m.relaxation_time is not None:
+        return classes | {"viscoelastic"}
+    if m.is_solid:
+        return classes | {"elastic"}
+    if m.yield_stress:
+        return classes | {"yield stress"}
+    return classes | ({"viscous"} if m.viscosity > 0 else {"liquid"})
+
+
+def trust_of(scenario: Scenario, methods: Sequence[str]) -> dict[str, Trust]:
+    """From the shipped table of known answers: cases of this physics within their tolerance."""
+    rows = reference("known_answers")
+    near = [row for row in rows.to_dict("records") if row["physics"] in physics_of(scenario)]
+    found = {}
+    for method in methods:
+        own = [row["error"] <= row["tolerance"] for row in near if row["method"] == method]
+        found[method] = Trust(sum(own), len(own))
+    return found
+
+
+def _valid(table: dict[str, Any]) -> bool:
+    from pydantic import ValidationError
+
+    try:
+        Scenario.model_validate(table)
+    except ValidationError:
+        return False
+    return True
+
+
+def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> Selection:
+    """Errors of all candidates from finished runs."""
+    result = Selection([], trust_of(scenario, methods), {}, list(runs))
+    fits: dict[str, dict[str, Fit]] = {}
+    for method in methods:
+        own = [r for r in runs if r.ok and r.method == method]
+        if len(own) < ENOUGH:
+            result.notes.append(f"{method}: only {len(own)} spacings completed, {ENOUGH} are needed")
+            continue
+        fits[method] = {key: extrapolate(own, key) for key in lengths_of(own[0].record)}
+        result.limits[method] = {key: fit.limit for key, fit in fits[method].items()}
+        if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0])):
+            result.erratic.add(method)
+    consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
+    if not trusted:
+        result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
+    if len(trusted) == 1:
+        result.notes.append(
+            f"the consensus is {trusted[0]}'s own limit: it has no second witness, and its bias is not known"
+        )
+    for run in runs:
+        if run.ok and run.method in fits:
+            result.candidates.append(_candidate(run, fits[run.method], consensus))
+    result.notes += [_unconverged(result, method) for method in fits if not result.converges(method)]
+    return result
+
+
+def _unconverged(result: Selection, method: str) -> str:
+    """That a method's error does not fall, with the errors."""
+    own = sorted((c for c in result.candidates if c.method == method), key=lambda c: -c.spacing)
+    errors = ", ".join(f"{100 * c.discretisation:.1f}" for c in own)
+    spacings = ", ".join(f"{1e3 * c.spacing:.3g}" for c in own)
+    return f"{method}: not converged: its error does not fall with the spacing ({errors} % at {spacings} mm)"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A length as limit + slope d: its limit at zero spacing, and its distance from the fit at each spacing."""
+
+    limit: float
+    slope: float
+    residual: dict[float, float]
+
+    @property
+    def explains(self) -> bool:
+        """Whether the line says more of the length than chance: its distances from it are small beside what it rises
+        over the spacings, or beside the length itself."""
+        rise = abs(self.slope) * (max(self.residual) - min(self.residual))
+        return max(self.residual.values()) <= max(0.5 * rise, NOISE * abs(self.limit))
+
+    def scatter(self, spacing: float) -> float:
+        """The largest distance from the fit at this spacing and finer ones."""
+        return max(r for d, r in self.residual.items() if d <= spacing * (1 + 1e-9))
+
+
+def extrapolate(runs: Sequence[Run], key: str) -> Fit:
+    """First order in the spacing, weighted by its inverse."""
+    d = np.array([r.record.spacing_m for r in runs])
+    q = np.array([lengths_of(r.record)[key] for r in runs])
+    slope, limit = np.polyfit(d, q, 1, w=1.0 / d)
+    residual = np.abs(q - (slope * d + limit))
+    return Fit(float(limit), float(slope), dict(zip(d.tolist(), residual.tolist(), strict=True)))
+
+
+def exact_lengths(run: Run) -> dict[str, float]:
+    """Lengths with an exact answer in a record."""
+    names = {"bead area [m^2]": "bead_area_m2"}
+    return {names[a.quantity]: a.reference for a in run.record.answers if a.quantity in names}
+
+
+def _consensus(result: Selection) -> dict[str, float]:
+    """Mean limit of the trusted methods (of all, if none is) for each length."""
+    voters = [m for m in result.limits if result.trust[m].trusted] or list(result.limits)
+    keys = {key for m in voters for key in result.limits[m]}
+    return {k: float(np.mean([result.limits[m][k] for m in voters if k in result.limits[m]])) for k in keys}
+
+
+def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float]) -> Candidate:
+    """The worst length decides."""
+    record = run.record
+    parts, exact = [(0.0, 0.0)], exact_lengths(run)
+    for key, value in lengths_of(record).items():
+        if key in exact:
+            parts.append((abs(value / exact[key] - 1.0), 0.0))
+            continue
+        limit, scatter = fits[key].limit, fits[key].scatter(record.spacing_m)
+        scale = abs(consensus.get(key, limit)) or 1.0
+        bias = abs(limit - consensus.get(key, limit)) / scale
+        parts.append((max(abs(value - limit), scatter) / scale, bias))
+    discretisation, bias = max(parts, key=sum)
+    cost = run.cost
+    return Candidate(
+        record.method,
+        record.spacing_m,
+        cost.mean_dt_s,
+        cost.wall_s,
+        cost.wall_per_simulated_s,
+        discretisation,
+        bias,
+        run,
+    )
+
+
+def confidence(result: Selection, tolerance: float) -> str:
+    """How sure the estimate is: high when two or more trusted methods converge and agree within the tolerance, medium
+    when they converge but do not agree, otherwise low: a limit that is not converged, or that nobody else confirms, may
+    be anything."""
+    trusted = [m for m in result.limits if result.trust[m].trusted]
+    if not trusted:
+        return "low: no method passes most known answers of this physics"
+    if len(trusted) == 1:
+        return f"low: only {trusted[0]} passes most known answers of this physics, and nothing else confirms its limit"
+    keys = set.intersection(*(set(result.limits[m]) for m in trusted))
+    spread = [np.ptp(v) / abs(np.mean(v)) for k in keys if (v := [result.limits[m][k] for m in trusted])]
+    widest = float(max(spread, default=math.inf))
+    words = f"the limits of {' and '.join(trusted)} differ by at most {widest:.1%}"
+    if loose := [m for m in trusted if not result.converges(m)]:
+        return f"low: {words}, but {' and '.join(loose)} is not converged"
+    return f"{'high' if widest <= tolerance else 'medium'}: {words}"
