@@ -19,12 +19,29 @@ def registered() -> list[str]:
 
 
 def method_names() -> list[str]:
-    """The same in the order in which tables show them (Method.rank)."""
-    return sorted(registered(), key=lambda name: (get_method(name).rank, name))
+    """Those that can be loaded, in the order in which tables show them (Method.rank)."""
+    return sorted(
+        (name for name in registered() if name not in broken()), key=lambda name: (get_method(name).rank, name)
+    )
+
+
+def broken() -> dict[str, str]:
+    """Registered methods that cannot be loaded, with the reason."""
+    found = {}
+    for name in registered():
+        try:
+            get_method(name)
+        except UserError as error:
+            found[name] = str(error)
+    return found
 
 
 def get_method(name: str) -> type[Method]:
     """The method registered under this name; raises UserError with the nearest known name."""
     for point in entry_points(group=ENTRY_POINTS, name=name):
-        return point.load()
+        try:
+            return point.load()
+        except Exception as error:  # whatever its package does: the message names it
+            reason = f"{type(error).__name__}: {error}"
+            raise UserError(f"the method {quoted(name)[1:-1]} ({point.value}) cannot be loaded: {reason}") from None
     raise UserError(f"no solver named {quoted(name)}{suggestion(name, registered())}")

@@ -9,14 +9,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, CancelledError, Future, ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from ..errors import Interrupted
+from ..errors import Interrupted, Obstacle, UserError
 from ..files import remove_quietly
 from .checkpoint import CHECKPOINT
 from .process import launch, stop_children
@@ -156,23 +156,27 @@ def _gather(
     stop: Callable[[], None] = lambda: None,
 ) -> None:
     """Submit everything, and hand results on as they come; whatever goes wrong, nothing more is begun."""
-    futures = {pool.submit(call): place for place, call in calls}
+    futures: dict[Any, bytes] = {}
     try:
+        for place, call in calls:
+            futures[pool.submit(call)] = place
         for future in _as_completed(list(futures)):
             ended(futures[future], future.result())
-    except BaseException:
+    except BaseException as error:
         for future in futures:
             future.cancel()
         stop()
+        if isinstance(error, BrokenExecutor | CancelledError):
+            raise Obstacle(f"the executor gave up: {type(error).__name__}: {error}") from None
         raise
 
 
 def as_executor(given: Any) -> Any:
-    """Something with `submit(function)`: an executor, or a dask Client. Raises TypeError for anything else."""
+    """Something with `submit(function)`: an executor, or a dask Client. Raises UserError for anything else."""
     if hasattr(given, "get_executor"):  # a dask Client
         return given.get_executor(pure=False)
     if not hasattr(given, "submit"):
-        raise TypeError(f"an executor has the interface of concurrent.futures; got {type(given).__name__}")
+        raise UserError(f"an executor has the interface of concurrent.futures; got {type(given).__name__}")
     return given
 
 

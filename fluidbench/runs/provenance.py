@@ -15,6 +15,7 @@ from ..registry import get_method
 from ..scenario.library import reference_tables
 
 IDLE = ("cli", "report", "study", "paper", "engines")  # rooms of the toolkit that no run of a native method enters
+KERNELS = "solvers"  # the package of laws and kernels, which methods of others may use, too
 HARDWARE = ("arch", "cores", "processor", "device")  # keys of a machine's description that decide what a run costs
 
 
@@ -24,11 +25,12 @@ def code(method: str, backend: str, rooms: tuple[str, ...] = ()) -> dict[str, st
     reference tables, and the versions of the languages of its kernels and of its engine. `rooms` are those of the
     toolkit that are entered, too."""
     found = get_method(method)
-    package, _, room = found.__module__.partition(".")
+    room = found.__module__.partition(".")[2] if found.__module__.startswith("fluidbench.") else ""
+    packages = {kind.__module__.partition(".")[0] for kind in found.__mro__} - {"builtins", "abc"}
     languages = {name: version(BACKENDS[name]) for name in dict.fromkeys((DEFAULT_BACKEND, backend))}
-    entered = (*rooms, room.partition(".")[0]) if package == "fluidbench" else rooms
+    entered = (*rooms, room.partition(".")[0]) if room else rooms
     idle = tuple(room for room in IDLE if room not in entered)
-    return {"sources": _hash_of(tuple(dict.fromkeys(("fluidbench", package))), idle), **languages, **found.versions()}
+    return {"sources": _hash_of(sorted({"fluidbench", KERNELS, *packages}), idle), **languages, **found.versions()}
 
 
 def changed(method: str) -> str:

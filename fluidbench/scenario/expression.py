@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import operator
 from collections.abc import Callable
 from typing import Annotated, Any
@@ -14,23 +15,18 @@ from ..errors import quoted, suggestion
 
 LONGEST = 1000  # characters
 NAMES = ("x", "y", "z", "pi")
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "sin": np.sin,
-    "cos": np.cos,
-    "tan": np.tan,
-    "exp": np.exp,
-    "log": np.log,
-    "sqrt": np.sqrt,
-    "abs": np.abs,
-    "tanh": np.tanh,
-    "sinh": np.sinh,
-    "cosh": np.cosh,
-    "atan2": np.arctan2,
-    "hypot": np.hypot,
-    "min": np.minimum,
-    "max": np.maximum,
-    "where": np.where,
+FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
+    **{
+        name: (1, getattr(np, name))
+        for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "tanh", "sinh", "cosh")
+    },
+    "atan2": (2, np.arctan2),
+    "hypot": (2, np.hypot),
+    "min": (2, np.minimum),
+    "max": (2, np.maximum),
+    "where": (3, lambda condition, a, b: np.where(condition > 0, a, b)),
 }
+"""Name -> (arguments, function); min and max may have more."""
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -58,7 +54,7 @@ def evaluate(text: str, points: np.ndarray) -> np.ndarray:
         raise ValueError(f"an expression of {len(text)} characters; {LONGEST} at most")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-        x, y, z = np.asarray(points, float).T
+        x, y, z = np.array(points, float).T
         with np.errstate(all="ignore"):  # what is no number is refused by whoever asked
             found = _value(tree, {"x": x, "y": y, "z": z, "pi": np.float64(np.pi)})
     except (SyntaxError, RecursionError, MemoryError):
@@ -67,6 +63,11 @@ def evaluate(text: str, points: np.ndarray) -> np.ndarray:
 
 
 def _value(node: ast.AST, names: dict[str, Any]) -> Any:
+    """What a node comes to, as floats: what holds is 1, what does not is 0."""
+    return np.asarray(_raw(node, names), float)
+
+
+def _raw(node: ast.AST, names: dict[str, Any]) -> Any:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return np.float64(node.value)
     if isinstance(node, ast.Name):
@@ -88,10 +89,13 @@ def _value(node: ast.AST, names: dict[str, Any]) -> Any:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         if node.func.id not in FUNCTIONS:
             raise ValueError(f"unknown function {quoted(node.func.id)}{suggestion(node.func.id, FUNCTIONS)}")
-        try:
-            return FUNCTIONS[node.func.id](*(_value(part, names) for part in node.args))
-        except TypeError:
-            raise ValueError(f"{node.func.id}: not with {len(node.args)} arguments") from None
+        wanted, function = FUNCTIONS[node.func.id]
+        parts = [_value(part, names) for part in node.args]
+        if len(parts) == wanted:
+            return function(*parts)
+        if node.func.id in ("min", "max") and len(parts) > wanted:
+            return functools.reduce(function, parts)
+        raise ValueError(f"{node.func.id}: not with {len(parts)} arguments")
     raise ValueError(f"{quoted(ast.unparse(node))} is nothing that an expression may hold")
 
 

@@ -27,6 +27,8 @@ def fill(
 
     Raises ValueError where nothing is inside.
     """
+    if not 0 < spacing < np.inf:
+        raise ValueError(f"spacing must be positive, got {spacing}")
     edges = np.asarray(upper, float) - np.asarray(lower, float)
     cells = np.maximum(1, np.rint(edges / spacing).astype(int))
     axes = [low + (np.arange(n) + 0.5) * edge / n for low, n, edge in zip(lower, cells, edges, strict=True)]

@@ -73,8 +73,10 @@ def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = N
         raise UserError(f"{path}: quick: a table is wanted (got {quoted(shorter)})")
     if quick:
         table = _merge(table, shorter) if shorter is not None else _coarser(table)
-    if isinstance(overrides, list):
-        overrides = dict(parse_override(text) for text in overrides)
+    if isinstance(overrides, str | list | tuple):
+        overrides = dict(parse_override(text) for text in ([overrides] if isinstance(overrides, str) else overrides))
+    if not isinstance(overrides, dict | None):
+        raise UserError(f"overrides are a table, or key=value texts; got {quoted(overrides)}")
     for key, value in (overrides or {}).items():
         assign(table, key, value)
     return validate(table, f"{path} with --set" if overrides else str(path))

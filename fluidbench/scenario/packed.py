@@ -20,6 +20,8 @@ class Packed:
             raw = base64.b64decode(values["float64"], validate=True)
             self.array = np.frombuffer(raw, "<f8").reshape(values["shape"])
         else:
+            if np.ma.isMaskedArray(values) or np.iscomplexobj(values):
+                raise ValueError("masked and complex numbers are none of a scenario's")
             self.array = np.array(values, "<f8")
         self.array.setflags(write=False)
 

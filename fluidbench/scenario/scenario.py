@@ -12,9 +12,10 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import quoted
-from .body import CORNERS, Body
+from .body import CORNERS, GRID, Body
 from .collider import Collider
 from .domain import Domain
+from .expression import evaluate
 from .extent import check_size, check_time
 from .material import Material
 from .model import Matrix, Model, Positive, Vector
@@ -62,7 +63,7 @@ class Scenario(Model):
     @classmethod
     def _names_a_folder(cls, name: str) -> str:
         plain = name.isprintable() and not set(name) & set('/\\:*?"<>|') and name == name.strip(" .")
-        if not (plain and 0 < len(name) <= LONGEST_NAME):
+        if not (plain and 0 < len(name) <= LONGEST_NAME and len(name.encode()) <= 2 * LONGEST_NAME):
             raise ValueError(
                 f'names a folder: 1 to {LONGEST_NAME} printable characters without / \\ : * ? " < > | and without a '
                 f"blank or a dot at either end (got {quoted(name)})"
@@ -80,6 +81,7 @@ class Scenario(Model):
     def _consistent(self) -> "Scenario":
         for check in (
             self._check_source,
+            self._check_fields,
             self._check_extent,
             self._check_nozzle,
             self._check_bodies,
@@ -140,6 +142,24 @@ class Scenario(Model):
                 f"bodies.{i}: volumes span {low:.3g} .. {high:.3g} spacing^3; a particle stands for one, within a "
                 f"factor of {VOLUMES:g}"
             )
+
+    def _check_fields(self) -> None:
+        """What expressions and arrays come to, looked at within each body; before anything is derived of them."""
+        for i, body in enumerate(self.bodies):
+            if body.where is not None or body.velocity_field is not None or body.positions is not None:
+                self._check_field(i, body)
+
+    def _check_field(self, i: int, body: Body) -> None:
+        points = np.asarray(body.center) + GRID * body.extent if body.positions is None else body.positions.array
+        inside = self.domain.contains(points)
+        if body.where is not None:
+            inside &= evaluate(body.where, points) > 0
+        if not inside.any():
+            raise ValueError(
+                f"bodies.{i}: no place of it is inside the domain" + " where it is to be" * bool(body.where)
+            )
+        if not np.isfinite(body.velocity_at(points[inside])).all():
+            raise ValueError(f"bodies.{i}.velocity_field: it is no number somewhere in the body")
 
     def _check_periodic(self) -> None:
         for axis, periodic in enumerate(self.domain.walls.periodic()):

@@ -11,7 +11,7 @@ from ..scenario import Scenario
 from .ablate_report import report
 from .ablation import Ablation, ablation
 from .result import Result
-from .workplace import Options, Workplace, as_scenario, methods_of
+from .workplace import Options, Workplace, as_scenario, methods_of, require_number
 
 WALL_LIMIT = 900.0  # s
 
@@ -41,9 +41,11 @@ def ablate(
 
     Raises UserError for what cannot be run, before anything is.
     """
+    require_number(tolerance, "tolerance", 1e-6)
     resolved, names = as_scenario(scenario), methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     found = ablation(resolved, names, tolerance, place)
     made = report(resolved, called or resolved.name, given, found, tolerance, place.store.root)
     missing = found.missing()
-    return Ablated(made, place.store.root, found.runs(), missing, not missing, place.keeper, found)
+    ok = not missing and any(run.ok for run in found.base.values())
+    return Ablated(made, place.store.root, found.runs(), missing, ok, place.keeper, found)

@@ -51,7 +51,7 @@ def report(scenario: Scenario, name: str, given: Sequence[str], done: Ablation, 
             )
     findings = [f"{m}: the scenario itself ended as {r.verdict}." for m, r in done.base.items() if not r.ok]
     findings += done.impossible
-    for method in done.base:
+    for method in (m for m, run in done.base.items() if run.ok):  # without it nothing was compared
         own = [e for e in done.effects if e.method == method]
         needed = [e.change.name for e in own if verdict(e, tolerance) == "needed"]
         spare = [e.change.name for e in own if verdict(e, tolerance) == "droppable"]

@@ -4,11 +4,13 @@ scenarios/analytic, one file each."""
 from __future__ import annotations
 
 import importlib
+import math
 import pkgutil
 import runpy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -105,6 +107,51 @@ class Case:
         return coarse * max(level_factor, 1.0)
 
 
+def check_case(case: Case, where: str) -> Case:
+    """The case; raises UserError for one that could not be run or judged."""
+    wrong = ""
+    if case.physics not in PHYSICS:
+        wrong = f"physics: {quoted(case.physics)}{suggestion(str(case.physics), PHYSICS)}"
+    elif case.drive is None and (case.scenarios is None or case.evaluate is None):
+        wrong = "it needs scenarios and evaluate, or drive"
+    for name in ("spacing", "tolerance"):
+        value = getattr(case, name)
+        if not isinstance(value, int | float) or not 0 < value < math.inf:
+            wrong = f"{name}: a positive number is wanted (got {quoted(value)})"
+    if wrong:
+        raise UserError(f"{where}: {wrong}")
+    return case
+
+
+def scenarios_of(case: Case, spacing: float) -> dict[str, Scenario]:
+    """A case's scenarios at a spacing [m]; raises UserError for what are none."""
+    assert case.scenarios is not None
+    try:
+        found = case.scenarios(spacing)
+    except UserError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise UserError(f"case {case.name}: its scenarios failed: {type(error).__name__}: {error}") from None
+    if not isinstance(found, dict) or not found or not all(isinstance(s, Scenario) for s in found.values()):
+        raise UserError(f"case {case.name}: scenarios(spacing) is to return a table of scenarios by label")
+    return found
+
+
+def check_finding(found: Any) -> Finding:
+    """What a case has found; raises TypeError or ValueError for what is no finding."""
+    if not isinstance(found, Finding):
+        raise TypeError(f"a Finding is wanted, not {type(found).__name__}")
+    if math.isnan(found.error) or found.error < 0:
+        raise ValueError(f"an error is a number of 0 or more, not {found.error}")
+    for number in found.numbers:
+        for value in (number.measured, number.reference):
+            float(value)
+    for curve in found.curves:
+        for values in (curve.x, curve.y, curve.reference_x, curve.reference_y):
+            np.asarray(values, float)
+    return found
+
+
 def cases() -> dict[str, Case]:
     """All cases of scenarios/analytic, ordered by physics."""
     from scenarios import analytic
@@ -119,7 +166,7 @@ def select(names: Sequence[str | Path | Case]) -> list[Case]:
     """The cases named, or all; a name may be that of a Python file, and a case stands for itself. Raises UserError with
     the nearest known name."""
     known = cases()
-    found = [name if isinstance(name, Case) else _named(str(name), known) for name in names]
+    found = [check_case(n, f"case {n.name}") if isinstance(n, Case) else _named(str(n), known) for n in names]
     return found if names else list(known.values())
 
 
@@ -140,8 +187,8 @@ def case_in(path: Path) -> Case:
         raise UserError(f"{shown}: no such case: {getattr(error, 'strerror', None) or error}") from None
     try:
         found = runpy.run_path(str(path))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise UserError(f"{shown}: it cannot be run: {type(error).__name__}: {error}") from None
     if not isinstance(found.get("CASE"), Case):
         raise UserError(f"{shown}: it defines no CASE (a fluidbench.study.case.Case)")
-    return found["CASE"]
+    return check_case(found["CASE"], shown)

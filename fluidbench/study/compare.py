@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Unpack
 
-from ..errors import UserError
+from ..errors import UserError, quoted
 from ..method.suitability import check_backend
 from ..method.target import DEFAULT_BACKEND, Target
 from ..method.verdict import lacking
@@ -18,7 +18,7 @@ from ..scenario import Scenario
 from ..scenario.numerics import configure
 from .compare_report import report
 from .result import Result
-from .workplace import Options, Workplace, as_scenario, methods_of, targets_of
+from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number, targets_of
 
 WALL_LIMIT = 900.0  # s
 
@@ -51,8 +51,15 @@ def compare(
 
     Raises UserError for what cannot be run, before anything is.
     """
+    backends = names_of(backends, "backends")
     resolved, names = as_scenario(scenario, quick), methods_of(methods, options, backends)
-    languages, threads = list(backends or [options.get("backend", DEFAULT_BACKEND)]), options.get("threads", 1)
+    require_number(checkpoint_every, "checkpoint_every", 0.0)
+    if render_every is not None:
+        require_number(render_every, "render_every", 1e-9)
+    if not verb.replace("-", "").replace("_", "").isalnum():
+        raise UserError(f"verb: a plain name is wanted (got {quoted(verb)})")
+    languages = backends or [options.get("backend", DEFAULT_BACKEND)]
+    threads = options.get("threads", 1)
     one = threads if len(languages) == 1 else 1
     place = Workplace.of({**options, "backend": languages[0], "threads": one}, WALL_LIMIT, names)
     targets = targets_of(place.target.device, languages, threads)
@@ -85,8 +92,7 @@ def jobs(
     scenario: Scenario, methods: Sequence[str], repeats: int, targets: Sequence[Target], **watched: Any
 ) -> list[Job]:
     """All runs of a comparison, `watched` as a Job says; raises UserError for an unknown method or setting."""
-    if repeats < 1:
-        raise UserError(f"repeats: at least 1 is wanted (got {repeats})")
+    require_number(repeats, "repeats", 1, whole=True)
     for name in methods:
         configure(get_method(name), scenario)
         for target in targets:

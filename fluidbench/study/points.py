@@ -126,7 +126,16 @@ def _experiment(function: str, label: str, task: Task) -> Experiment:
 
 
 def measure_point(task: Task) -> dict[str, Any]:
-    """One point: do the defaults hold, and where are the limits of the resting block and of the thrown lump?"""
+    """One point: do the defaults hold, and where are the limits of the resting block and of the thrown lump? A method
+    whose session cannot be told its step refuses."""
+    try:
+        return _point(task)
+    except NotImplementedError as reason:
+        named = {key: task[key] for key in ("axis", "value", "method")}
+        return named | {"verdict": REFUSED, "reason": str(reason)}
+
+
+def _point(task: Task) -> dict[str, Any]:
     from .limits import Limit, bisect, block_limit, default_dt, lump_survives
 
     row = {key: task[key] for key in ("axis", "value", "method")}

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import Obstacle
 from ..report.report import Report, tell, write
 from ..runs.record import Run
+from ..runs.store import Store
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,10 +51,13 @@ class Result:
     def save(self, folder: str | Path | None = None) -> Path:
         """Write what the command line writes (tables, pictures, page) beside the runs, which are copied where they lie
         elsewhere; returns the page's path."""
-        target = self.root if folder is None else Path(folder).absolute()
-        if target != self.root:
-            for run in self.runs:
-                shutil.copytree(run.folder, target / run.folder.relative_to(self.root), dirs_exist_ok=True)
+        target = self.root if folder is None else Store(Path(folder).expanduser().absolute()).root
+        try:
+            if target.resolve() != self.root.resolve():
+                for run in self.runs:
+                    shutil.copytree(run.folder, target / run.folder.relative_to(self.root), dirs_exist_ok=True)
+        except (OSError, shutil.Error) as error:
+            raise Obstacle(f"cannot copy the runs to {target}: {getattr(error, 'strerror', None) or error}") from None
         return write(self.report, target)
 
     def show(self, console: Console | None = None) -> None:

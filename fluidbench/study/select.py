@@ -13,7 +13,7 @@ from ..scenario import Scenario
 from .result import Result
 from .select_report import report
 from .selection import FACTORS, Selection, _valid, assess
-from .workplace import Options, Workplace, as_scenario, methods_of
+from .workplace import Options, Workplace, as_scenario, methods_of, require_number
 
 WALL_LIMIT = 900.0  # s
 
@@ -44,6 +44,7 @@ def select(
 
     Raises UserError for what cannot be run, before anything is.
     """
+    require_number(tolerance, "tolerance", 1e-6)
     resolved, names = as_scenario(scenario), methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     found = assess(resolved, names, place.run(candidates(resolved, names, place), "select"))

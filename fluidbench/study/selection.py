@@ -161,7 +161,11 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> S
         if len(own) < ENOUGH:
             result.notes.append(f"{method}: only {len(own)} spacings completed, {ENOUGH} are needed")
             continue
-        fits[method] = {key: extrapolate(own, key) for key in lengths_of(own[0].record)}
+        every = [lengths_of(r.record) for r in own]
+        shared = [key for key in every[0] if all(key in lengths for lengths in every)]
+        if left := sorted({key for lengths in every for key in lengths} - set(shared)):
+            result.notes.append(f"{method}: left out, for want of it at some spacing: {', '.join(left)}")
+        fits[method] = {key: extrapolate(own, key) for key in shared}
         result.limits[method] = {key: fit.limit for key, fit in fits[method].items()}
         if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0])):
             result.erratic.add(method)
@@ -236,6 +240,8 @@ def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float]) -> C
     for key, value in lengths_of(record).items():
         if key in exact:
             parts.append((abs(value / exact[key] - 1.0), 0.0))
+            continue
+        if key not in fits:
             continue
         limit, scatter = fits[key].limit, fits[key].scatter(record.spacing_m)
         scale = abs(consensus.get(key, limit)) or 1.0

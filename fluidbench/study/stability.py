@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Unpack
 
+from ..method.verdict import lacking
 from ..scenario import Scenario
 from .case import cases
-from .points import HELD, REFUSED, block_tasks, choose, measure_blocks, measure_points, point_tasks
+from .points import ERROR, HELD, REFUSED, block_tasks, choose, measure_blocks, measure_points, point_tasks
 from .result import Result
 from .stability_report import report
 from .trials import plan, run
-from .workplace import Options, Workplace, as_scenario, methods_of
+from .workplace import Options, Workplace, as_scenario, methods_of, names_of
 
 WALL_LIMIT = 1800.0  # s
 
@@ -43,7 +44,7 @@ def stability(
     Raises UserError for what is not known, before anything is run.
     """
     resolved, names = as_scenario(scenario), methods_of(methods, options)
-    chosen, place = choose(axes, names), Workplace.of(options, WALL_LIMIT, names)
+    chosen, place = choose(names_of(axes, "axes") or [], names), Workplace.of(options, WALL_LIMIT, names)
     blocks, points = block_tasks(names, quick, place.target), point_tasks(resolved, chosen, names, quick, place.target)
     measured = measure_blocks(blocks, lambda work: place.run(work, "blocks", together=True))
     rows = measure_points(points, lambda work: place.run(work, "points", together=True))
@@ -51,7 +52,12 @@ def stability(
     trials = [t for c in own for t in plan([c], [c.about], ["coarse"], False, place.target, place.wall_limit)]
     if trials:
         run(trials, place, "own numerics")
-    ok = all(row["verdict"] in (HELD, REFUSED) for row in rows) and not any("reason" in block for block in measured)
+    missing = lacking(trials)
+    missing += [
+        f"{p['axis']} = {p['value']:g}, {p['method']}: {p.get('reason', '')}" for p in rows if p["verdict"] == ERROR
+    ]
+    missing += [f"{b['kind']} block, {b['method']}: {b['reason']}" for b in measured if "reason" in b]
+    ok = all(row["verdict"] in (HELD, REFUSED) for row in rows) and not missing
     runs = [found for trial in trials for found in trial.runs.values()]
     made = report(resolved, chosen, rows, measured, trials)
-    return StabilityMap(made, place.store.root, runs, ok=ok, keeper=place.keeper, points=rows, blocks=measured)
+    return StabilityMap(made, place.store.root, runs, missing, ok, keeper=place.keeper, points=rows, blocks=measured)

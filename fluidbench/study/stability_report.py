@@ -23,7 +23,9 @@ def report(
 
     lines = findings(points, blocks)
     for trial in own:
-        if trial.finding is not None:
+        if trial.finding is None:
+            lines.append(f"{trial.name}: {trial.verdict}: {trial.note}.")
+        else:
             first = trial.finding.numbers[0]
             lines.append(
                 f"{trial.method}, {trial.case.title}: {first.quantity}: {first.measured:.2f}, fitted once; "

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..runs.job import Job
 from ..runs.record import Run
 from ..scenario import Scenario
 from ..scenario.numerics import configure
-from .case import METHOD_OF_LAW, Case, Finding
+from .case import METHOD_OF_LAW, Case, Finding, check_finding, scenarios_of
 from .workplace import Workplace
 
 if TYPE_CHECKING:
@@ -85,6 +85,7 @@ def plan(
 ) -> list[Trial]:
     """Every trial with its jobs; a method that is skipped has none and says why."""
     trials = []
+    levels = list(levels)
     for case in chosen:
         if quick and case.quick is None:
             continue
@@ -93,7 +94,6 @@ def plan(
             if case.drive is not None:
                 trials.append(Trial(case, METHOD_OF_LAW, level, spacing))
                 continue
-            assert case.scenarios is not None
             for method in methods:
                 if quick and (case.skips(method) or method in case.exempt):
                     continue
@@ -101,7 +101,7 @@ def plan(
                 if reason := case.skips(method):
                     trial.verdict, trial.note = SKIPPED, reason
                 else:
-                    trial.jobs = _jobs(case.scenarios(spacing), method, target, wall_limit)
+                    trial.jobs = _jobs(scenarios_of(case, spacing), method, target, wall_limit)
                 trials.append(trial)
     return trials
 
@@ -157,21 +157,24 @@ def evaluate(trial: Trial) -> None:
         first = min(failed, key=lambda run: evidence_of(run.verdict) is Evidence.INSTABILITY)
         trial.verdict, trial.note = first.verdict, first.reason
         return
-    assert trial.case.evaluate is not None
-    try:
-        trial.finding = trial.case.evaluate({label: trial.runs[label] for label in trial.jobs})
-    except Exception as error:  # one case's mistake must not end the others; it is shown as what it is
-        trial.verdict, trial.note = Verdict.ERROR, f"its evaluation failed: {type(error).__name__}: {error}"
-        return
-    _judge(trial)
+    judge(trial, lambda case: case.evaluate({label: trial.runs[label] for label in trial.jobs}))
 
 
 def evaluate_law(trial: Trial) -> None:
     """Drive a law at one point, in this process."""
-    assert trial.case.drive is not None
     start = time.perf_counter()
-    trial.finding = trial.case.drive(trial.spacing)
+    judge(trial, lambda case: case.drive(trial.spacing))
     trial.cost = {"particles": 1, "wall_s": time.perf_counter() - start}
+
+
+def judge(trial: Trial, found: Callable[[Any], Any]) -> None:
+    """Take a case's finding and judge it. One case's mistake must not end the others: it is shown as what it is."""
+    try:
+        finding = found(trial.case)
+        trial.finding = check_finding(finding)
+    except (Exception, SystemExit) as error:
+        trial.verdict, trial.note = Verdict.ERROR, f"its evaluation failed: {type(error).__name__}: {error}"
+        return
     _judge(trial)
 
 

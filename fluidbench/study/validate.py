@@ -12,7 +12,7 @@ from .case import Case, select
 from .result import Result
 from .trials import EXEMPT, PASS, SKIPPED, Trial, plan, run
 from .validate_report import report
-from .workplace import Options, Workplace, methods_of
+from .workplace import Options, Workplace, methods_of, names_of
 
 if TYPE_CHECKING:
     pass
@@ -46,6 +46,9 @@ def validate(
     """
     names = methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
+    cases, levels = names_of(cases, "cases"), names_of(levels, "levels") or ()
+    if not levels:
+        raise UserError("levels: none is named")
     chosen = select(cases or [])
     if cases and quick and (long := [case.name for case in chosen if case.quick is None]):
         raise UserError(f"{', '.join(long)}: too dear to have a quick version; leave quick out")
@@ -57,5 +60,5 @@ def validate(
 def result_of(trials: list[Trial], place: Workplace) -> Validation:
     root = place.store.root
     runs = [found for t in trials for found in t.runs.values()]
-    ok = all(t.verdict in (PASS, EXEMPT, SKIPPED) for t in trials)
+    ok = all(t.verdict in (PASS, EXEMPT, SKIPPED) for t in trials) and any(t.judged for t in trials)
     return Validation(report(trials, root), root, runs, ok=ok, keeper=place.keeper, trials=trials)

@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -80,8 +80,13 @@ class Workplace:
             if name not in Options.__annotations__:
                 raise UserError(f"no option {quoted(name)}{suggestion(name, Options.__annotations__)}")
         limit = options.get("wall_limit", wall_limit)
-        if not 0 < limit < math.inf:
-            raise UserError(f"wall_limit: a positive number of seconds is wanted (got {limit:g})")
+        require_number(limit, "wall_limit", 1e-3)
+        require_number(options.get("threads", 1), "threads", 1, whole=True)
+        if options.get("jobs") is not None:
+            require_number(options.get("jobs"), "jobs", 1, whole=True)
+        for name in ("device", "backend"):
+            if not isinstance(options.get(name, ""), str):
+                raise UserError(f"{name}: a name is wanted (got {quoted(options.get(name))})")
         device = options.get("device", "cpu")
         gpus = visible_gpus() if device == "cuda" else ()
         device = "cuda:0" if device == "cuda" else device
@@ -97,7 +102,9 @@ class Workplace:
         if out is None:
             keeper = Scratch()
             out = keeper.folder
-        store = Store(Path(out).absolute(), options.get("fresh", False), keeper)
+        if not isinstance(out, str | Path) or not str(out):
+            raise UserError(f"out: a folder is wanted (got {quoted(out)})")
+        store = Store(Path(out).expanduser().absolute(), options.get("fresh", False), keeper)
         return cls(target, store, workers, limit, executor, options.get("progress", True), gpus)
 
     @property
@@ -117,7 +124,29 @@ class Workplace:
 
 def as_scenario(given: Scenario | str | Path, quick: bool = False) -> Scenario:
     """A scenario, or the one meant by a name or a file."""
+    if not isinstance(given, Scenario | str | Path):
+        raise UserError(f"a scenario, a name or a file is wanted (got {quoted(given)})")
     return given if isinstance(given, Scenario) else load(given, quick=quick)
+
+
+def names_of(given: Any, what: str) -> list[Any] | None:
+    """A list of names, of paths or of cases, from one of them or several; None for None. Raises UserError for what is
+    none, and for one that is named twice."""
+    if given is None:
+        return None
+    found = [given] if isinstance(given, str | Path) or not isinstance(given, Iterable) else list(given)
+    for name in found:
+        if found.count(name) > 1:
+            raise UserError(f"{what}: {quoted(str(name))[1:-1]} is named twice")
+    return found
+
+
+def require_number(value: Any, what: str, low: float, whole: bool = False) -> None:
+    """Raise UserError unless a value is a finite number of at least `low` (whole, where it counts something)."""
+    kinds = int if whole else int | float
+    if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value < math.inf:
+        kind = "whole number" if whole else "number"
+        raise UserError(f"{what}: a {kind} of at least {low:g} is wanted (got {quoted(value)})")
 
 
 def methods_of(
@@ -131,14 +160,14 @@ def methods_of(
         asked = set(backends or [options.get("backend", DEFAULT_BACKEND)])
         able = [m for m in map(get_method, method_names()) if device in m.devices and asked <= set(m.backends)]
         return [method.name for method in able if method.missing() is None]
-    names = [given] if isinstance(given, str) else list(given)
+    names = names_of(given, "methods")
     if not names:
         raise UserError("no method is named")
     for name in names:
+        if not isinstance(name, str):
+            raise UserError(f"methods are names; got {quoted(name)}")
         if reason := get_method(name).missing():
             raise UserError(reason)
-        if names.count(name) > 1:
-            raise UserError(f"{quoted(name)[1:-1]} is named twice")
     return names
 
 

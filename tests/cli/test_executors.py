@@ -37,7 +37,7 @@ def test_submitits_jobs_are_an_executor(tmp_path, here):
 
 
 def test_what_is_no_executor_is_refused(tmp_path):
-    with pytest.raises(TypeError, match=r"the interface of concurrent\.futures; got int"):
+    with pytest.raises(UserError, match=r"the interface of concurrent\.futures; got int"):
         fb.validate(CASES, ["mpm"], quick=True, out=tmp_path, executor=3)
     with pytest.raises(UserError, match="no 'slrum'; did you mean 'slurm'"):
         fb.validate(CASES, ["mpm"], quick=True, out=tmp_path / "out", executor="slrum")

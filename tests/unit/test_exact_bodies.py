@@ -31,6 +31,9 @@ BOX = {"kind": "box", "center": [0.1, 0.1, 0.1], "size": [0.1, 0.1, 0.1]}
         ("2 ** 3 ** 2", [512, 512]),
         ("cos(pi * x)", [1, -1]),
         ("max(x, z) * min(1, y)", [2, -12]),
+        ("max(x, y, z)", [2, 3]),
+        ("(x > 1) + (z > 0)", [1, 2]),
+        ("-(x > 1)", [0, -1]),
         ("x > 1", [0, 1]),
         ("0 < x <= 3 and not y > 0", [0, 1]),
         ("x < 1 or z < 1", [1, 1]),
@@ -54,7 +57,8 @@ def test_expressions(text, values):
         ("x.real", "is nothing that an expression may hold"),
         ("'a'", "is nothing that an expression may hold"),
         ("[x for x in y]", "is nothing that an expression may hold"),
-        ("sin(x, y, z, 1)", "sin: not with 4 arguments"),
+        ("sin(x, y)", "sin: not with 2 arguments"),
+        ("where(x, y)", "where: not with 2 arguments"),
         ("sin(x=1)", "is nothing that an expression may hold"),
         ("(lambda: 1)()", "is nothing that an expression may hold"),
         ("x" * 1001, "1001 characters; 1000 at most"),
@@ -155,3 +159,32 @@ def test_what_is_cut_is_not_compared_with_what_is_whole():
     cut = scenario(bodies=[whole | {"where": "z < 0.05"}], spacing=0.02, reference="martin_moyce_front")
     record = fb.run(cut, "mpm", progress=False).record
     assert not record.answers and "it is of one column" in record.not_compared[0]
+
+
+@pytest.mark.parametrize("text", ["max(x, y, z)", "min(z, y, x)", "abs(x) + hypot(y, z)", "where(x > 0, y, z)"])
+def test_an_expression_leaves_the_places_alone(text):
+    points = POINTS.copy()
+    evaluate(text, points)
+    assert np.array_equal(points, POINTS)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"where": "x > 100"}, "no place of it is inside the domain where it is to be"),
+        ({"where": "log(-1) > 0"}, "no place of it is inside"),
+        ({"velocity_field": ["log(-1)", "0", "0"]}, "it is no number somewhere in the body"),
+        ({"velocity_field": ["1 / (x - 0.1)", "0", "0"]}, "it is no number somewhere in the body"),
+    ],
+)
+def test_a_body_that_is_none_is_refused(change, words):
+    with pytest.raises(UserError, match=rf"bodies\.0.*{words}"):
+        scenario(bodies=[BOX | change])
+
+
+def test_only_real_numbers_are_packed():
+    for wrong in (np.ma.masked_array([1.0, 2.0], [0, 1]), np.array([1j])):
+        with pytest.raises(ValueError, match="masked and complex"):
+            Packed(wrong)
+    with pytest.raises(ValueError, match="spacing must be positive"):
+        fb.fill([0] * 3, [0.1] * 3, 0)

@@ -455,7 +455,7 @@ def test_a_dask_client_gives_its_executor(tmp_path, launched):
     (made,) = execute(repeats(0), Store(tmp_path), SILENT, executor=client)
     assert made.ok and asked == [{"pure": False}] and len(queue.futures) == 1
     for wrong in (5, "slurm", object()):
-        with pytest.raises(TypeError, match=r"interface of concurrent\.futures; got"):
+        with pytest.raises(UserError, match=r"interface of concurrent\.futures; got"):
             as_executor(wrong)
 
 

@@ -185,7 +185,7 @@ def test_a_comparison_holds_what_it_was_asked_for(tmp_path, monkeypatch):
     assert [run.label for run in both.runs] == ["mpm", "mpm (taichi)"] and calls[1][1].target.threads == 2
     one = module.run(BEAD, "pbd", out=tmp_path, progress=False)
     assert (one.method, calls[-1][0].film_every, len(calls[-1])) == ("pbd", None, 1)
-    with pytest.raises(UserError, match="repeats: at least 1"):
+    with pytest.raises(UserError, match="repeats: a whole number of at least 1"):
         module.compare(BEAD, repeats=0, out=tmp_path)
 
 
@@ -224,9 +224,15 @@ def test_runs_without_a_folder_live_as_long_as_they_are_held(monkeypatch):
 def test_options_that_there_are_not_are_refused():
     for given, words in (
         ({"wall_limt": 3}, "no option 'wall_limt'; did you mean 'wall_limit'"),
-        ({"wall_limit": -1.0}, r"a positive number of seconds is wanted \(got -1\)"),
-        ({"wall_limit": math.nan}, "a positive number"),
+        ({"wall_limit": -1.0}, r"a number of at least 0\.001 is wanted \(got -1\.0\)"),
+        ({"wall_limit": math.nan}, "a number of at least"),
         ({"repeats": 0}, "at least 1 is wanted"),
+        ({"repeats": 1.5}, "a whole number"),
+        ({"out": ""}, "a folder is wanted"),
+        ({"backends": ["warp", "warp"]}, "named twice"),
+        ({"device": 0}, "a name is wanted"),
+        ({"verb": "../evil"}, "a plain name"),
+        ({"render_every": 0}, "render_every"),
     ):
         with pytest.raises(UserError, match=words):
             module.compare(BEAD, ["mpm"], **given)
@@ -237,16 +243,16 @@ def test_a_workplace_is_checked_before_anything_is_written(tmp_path):
         ({"device": "cuda:99"}, "no device 'cuda:99'"),
         ({"backend": "wrap"}, "backend: no 'wrap'"),
         ({"threads": 2}, "2 threads are for taichi"),
-        ({"jobs": 0}, "0 runs at a time"),
+        ({"jobs": 0}, "jobs: a whole number of at least 1"),
     ):
         with pytest.raises(UserError, match=words):
             Workplace.of({"out": tmp_path / "x", **options}, 5.0, ["mpm"])
-    with pytest.raises(TypeError, match=r"concurrent\.futures"):
+    with pytest.raises(UserError, match=r"concurrent\.futures"):
         Workplace.of({"out": tmp_path / "x", "executor": 5}, 5.0)
     place = Workplace.of({"out": str(tmp_path / "x"), "jobs": 3, "fresh": True, "progress": False}, 5.0)
     assert (place.workers, place.wall_limit, place.store.root, place.store.fresh) == (3, 5.0, tmp_path / "x", True)
     assert not place.progress and place.executor is None and place.keeper is None and not list(tmp_path.iterdir())
-    with pytest.raises(TypeError):
+    with pytest.raises(UserError):
         as_executor(None)
 
 

@@ -280,7 +280,7 @@ CASE = Case("mine", "my own", "liquid", "a book", "relative", 0.01, 0.1, drive=l
 
 def test_a_case_may_be_an_object_or_a_file_of_the_users(tmp_path):
     (tmp_path / "mine.py").write_text(MINE)
-    own = case("own")
+    own = case("own", drive=lambda dt: Finding(dt))
     found = select([own, tmp_path / "mine.py", str(tmp_path / "mine.py"), "free_fall"])
     assert found[0] is own and [c.name for c in found] == ["own", "mine", "mine", "free_fall"]
     assert case_in(tmp_path / "mine.py").drive(0.5).error == 0.5
@@ -308,3 +308,44 @@ def test_a_file_that_holds_no_case_says_why(tmp_path, monkeypatch, text, words):
         Path("mine.py").write_text(text)
     with pytest.raises(UserError, match=f"^{words}"):
         select(["mine.py"])
+
+
+@pytest.mark.parametrize(
+    ("finding", "words"),
+    [
+        (lambda: 0.1, "TypeError: a Finding is wanted, not float"),
+        (lambda: Finding(-5.0), "ValueError: an error is a number of 0 or more, not -5.0"),
+        (lambda: Finding(math.nan), "ValueError: an error is a number of 0 or more, not nan"),
+        (lambda: exit(0), "SystemExit: 0"),
+    ],
+)
+def test_what_is_no_finding_is_an_error_and_never_a_pass(finding, words):
+    made = Trial(case(drive=lambda dt: finding()), "law", "coarse", 0.01)
+    evaluate_law(made)
+    assert made.verdict == "error" and made.note == f"its evaluation failed: {words}" and made.finding is None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, "it needs scenarios and evaluate, or drive"),
+        ({"drive": lambda dt: Finding(dt), "spacing": "x"}, "spacing: a positive number is wanted"),
+        ({"drive": lambda dt: Finding(dt), "tolerance": math.nan}, "tolerance: a positive number is wanted"),
+        ({"drive": lambda dt: Finding(dt), "physics": "liqid"}, "did you mean 'liquid'"),
+        ({"scenarios": lambda d: 1 / 0, "evaluate": lambda r: Finding(0)}, "its scenarios failed: ZeroDivisionError"),
+        ({"scenarios": lambda d: {}, "evaluate": lambda r: Finding(0)}, "a table of scenarios by label"),
+        ({"scenarios": lambda d: [scenario()], "evaluate": lambda r: Finding(0)}, "a table of scenarios by label"),
+    ],
+)
+def test_what_is_no_case_is_refused_before_anything_runs(change, words, tmp_path):
+    with pytest.raises(UserError, match=words):
+        module.validate([case("own", **change)], ["mpm"], out=tmp_path / "out", progress=False)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_validation_without_a_judged_trial_is_none(tmp_path):
+    law = case("own", drive=lambda dt: Finding(dt))
+    assert module.validate([law], ["mpm"], levels=(level for level in ["coarse"]), out=tmp_path, progress=False).ok
+    assert not module.result_of([], workplace_in(tmp_path)).ok
+    with pytest.raises(UserError, match="levels: none is named"):
+        module.validate([law], ["mpm"], levels=[], out=tmp_path)
