@@ -48,11 +48,14 @@ class Ended(Protocol):
     @property
     def reason(self) -> str: ...
 
+    @property
+    def evidence(self) -> Evidence: ...
+
 
 def lacking(runs: Iterable[Ended], refusals: bool = True) -> list[str]:
     """One line a run that a study needed and has nothing of, with the reason; a refusal may be an answer in itself
     (`refusals` False)."""
-    missing = [run for run in runs if evidence_of(run.verdict) is Evidence.NOTHING]
+    missing = [run for run in runs if run.evidence is Evidence.NOTHING]
     if not refusals:
         missing = [run for run in missing if run.verdict != Verdict.REFUSED]
     return list(dict.fromkeys(f"{run.name}: {run.verdict}: {run.reason}" for run in missing))

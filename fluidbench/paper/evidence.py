@@ -60,8 +60,8 @@ class Evidence:
     other: dict[str, list[Run]] = field(default_factory=dict)  # `repeats` in the other backend
     other_trials: list[Trial] = field(default_factory=list)  # COST_CASES in the other backend
 
-    def runs(self) -> list[Run]:
-        """Every run that was made for it."""
+    def sweeps(self) -> list[Run]:
+        """Every run of the scenario itself."""
         groups = [
             *self.repeats.values(),
             *self.grids.values(),
@@ -70,18 +70,19 @@ class Evidence:
             *self.other.values(),
             list(self.second.values()),
         ]
-        trials = [list(t.runs.values()) for t in [*self.trials, *self.other_trials]]
-        return [run for group in [*groups, *trials] for run in group]
+        return [run for group in groups for run in group]
+
+    def runs(self) -> list[Run]:
+        """Every run that was made for it."""
+        return [*self.sweeps(), *(run for t in [*self.trials, *self.other_trials] for run in t.runs.values())]
 
     def missing(self) -> list[str]:
         """What it needed and has nothing of, one line each, with the reason."""
         points = [p for rows in self.limits.values() for p in rows if p.get("verdict") == ERROR]
-        return lacking(
-            [
-                *self.runs(),
-                *(t for t in [*self.trials, *self.other_trials] if t.judged and not t.runs and t.finding is None),
-            ]
-        ) + [f"stability, {p['axis']} = {p['value']:g}, {p['method']}: {p['verdict']}: {p['reason']}" for p in points]
+        judged = [t for t in [*self.trials, *self.other_trials] if t.judged]
+        return lacking([*self.sweeps(), *judged]) + [
+            f"stability, {p['axis']} = {p['value']:g}, {p['method']}: {p['verdict']}: {p['reason']}" for p in points
+        ]
 
 
 def chosen_cases(quick: bool) -> list[Case]:

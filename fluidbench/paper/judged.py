@@ -9,7 +9,6 @@ from statistics import mean, stdev
 from typing import Any
 
 from ..method.verdict import Evidence as Weight
-from ..method.verdict import evidence_of
 from ..registry import get_method
 from ..runs.record import Run
 from ..scenario import Scenario
@@ -57,7 +56,7 @@ def cells(e: Evidence) -> list[Cell]:
     """Every cell of the paper's table, then its claims in words. Where nothing ran there is no verdict at all: what is
     shipped, and bounds, say nothing of code that does not run."""
     found = [*paradigm(), *fidelity(e), *stability(e), *cost(e), *best_for(e), *limits(e), *claims(e), *frameworks(e)]
-    if not any(evidence_of(run.verdict) is not Weight.NOTHING for run in e.runs()):
+    if all(run.evidence is Weight.NOTHING for run in e.runs()):
         found = [replace(cell, verdict=OPEN) for cell in found]
     return found
 

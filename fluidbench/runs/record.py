@@ -153,9 +153,14 @@ class Run:
         return f"{self.record.scenario}, {self.label}, d = {1e3 * self.record.spacing_m:.3g} mm"
 
     @property
+    def evidence(self) -> Evidence:
+        """What it says of its method."""
+        return evidence_of(self.verdict)
+
+    @property
     def ok(self) -> bool:
         """Whether it has a result."""
-        return evidence_of(self.verdict) is Evidence.RESULT
+        return self.evidence is Evidence.RESULT
 
     @property
     def target(self) -> Target:

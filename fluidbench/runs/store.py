@@ -7,14 +7,11 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import Obstacle, UserError, quoted
 from ..files import PART, digest, remove_quietly, write_atomically
 from .work import canonical, key_of
-
-if TYPE_CHECKING:
-    pass
 
 RECORD, SEAL, CLAIM = "record.json", "seal", "claim.lock"
 PATIENCE = 5.0  # seconds after which somebody who waits for a claim is told

@@ -74,8 +74,9 @@ def compare(
         checkpoint_every=checkpoint_every,
     )
     runs = place.run(planned, verb)
-    ok = any(run.ok for run in runs) and not lacking(runs, refusals=False)
-    return Comparison(report(runs, place.store.root, verb), place.store.root, runs, ok=ok, keeper=place.keeper)
+    missing = lacking(runs, refusals=False)
+    ok = any(run.ok for run in runs) and not missing
+    return Comparison(report(runs, place.store.root, verb), place.store.root, runs, missing, ok, keeper=place.keeper)
 
 
 def run(scenario: Scenario | str | Path, method: str, **more: Any) -> Run:

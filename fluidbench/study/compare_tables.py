@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from statistics import mean
-from typing import TYPE_CHECKING
 
 from ..measure.tower import Print
 from ..method.verdict import Evidence, evidence_of
 from ..report.table import Table, label, number, spread
 from ..runs.record import Record, Run
 from .lengths import lengths_of
-
-if TYPE_CHECKING:
-    pass
 
 
 def by_method(results: Sequence[Run]) -> dict[str, list[Record]]:

@@ -57,7 +57,7 @@ def stability(
         f"{p['axis']} = {p['value']:g}, {p['method']}: {p.get('reason', '')}" for p in rows if p["verdict"] == ERROR
     ]
     missing += [f"{b['kind']} block, {b['method']}: {b['reason']}" for b in measured if "reason" in b]
-    ok = all(row["verdict"] in (HELD, REFUSED) for row in rows) and not missing
+    ok = all(row["verdict"] in (HELD, REFUSED) for row in rows) and all(t.held for t in trials) and not missing
     runs = [found for trial in trials for found in trial.runs.values()]
     made = report(resolved, chosen, rows, measured, trials)
     return StabilityMap(made, place.store.root, runs, missing, ok, keeper=place.keeper, points=rows, blocks=measured)

@@ -36,7 +36,7 @@ def report(
         f"fluidbench stability: {scenario.name}",
         "The largest stable time step of blocks at rest, and of a lump of the material thrown at the floor.",
         lines,
-        [_blocks(blocks), _points(points)],
+        [*([_blocks(blocks)] if blocks else []), _points(points)],
         pd.DataFrame([*points, *blocks]),
         _maps(points, axes),
     )

@@ -60,6 +60,11 @@ class Trial:
         return self.verdict != SKIPPED
 
     @property
+    def held(self) -> bool:
+        """Whether nothing speaks against its method: within tolerance, exempt from it, or not to be run."""
+        return self.verdict in (PASS, EXEMPT, SKIPPED)
+
+    @property
     def evidence(self) -> Evidence:
         """What it says of its method: a finding is a result, whatever became of the tolerance."""
         if self.finding is not None:
@@ -123,7 +128,6 @@ def _jobs(scenarios: dict[str, Scenario], method: str, target: Target, wall_limi
 
 def run(trials: Sequence[Trial], place: Workplace, title: str = "known answers") -> None:
     """Run all jobs and evaluate each trial as soon as its last job has ended."""
-
     for trial in trials:
         if trial.case.drive is not None:
             evaluate_law(trial)
@@ -154,7 +158,7 @@ def evaluate(trial: Trial) -> None:
         "wall_per_simulated_s": sum(cost.wall_s for cost in costs) / simulated if simulated else math.nan,
     }
     if failed:
-        first = min(failed, key=lambda run: evidence_of(run.verdict) is Evidence.INSTABILITY)
+        first = min(failed, key=lambda run: run.evidence is Evidence.INSTABILITY)
         trial.verdict, trial.note = first.verdict, first.reason
         return
     judge(trial, lambda case: case.evaluate({label: trial.runs[label] for label in trial.jobs}))

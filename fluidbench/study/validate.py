@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 from ..errors import UserError
+from ..method.verdict import lacking
 from .case import Case, select
 from .result import Result
-from .trials import EXEMPT, PASS, SKIPPED, Trial, plan, run
+from .trials import Trial, plan, run
 from .validate_report import report
 from .workplace import Options, Workplace, methods_of, names_of
-
-if TYPE_CHECKING:
-    pass
-
 
 WALL_LIMIT = 1800.0  # s
 
@@ -60,5 +57,6 @@ def validate(
 def result_of(trials: list[Trial], place: Workplace) -> Validation:
     root = place.store.root
     runs = [found for t in trials for found in t.runs.values()]
-    ok = all(t.verdict in (PASS, EXEMPT, SKIPPED) for t in trials) and any(t.judged for t in trials)
-    return Validation(report(trials, root), root, runs, ok=ok, keeper=place.keeper, trials=trials)
+    judged = [t for t in trials if t.judged]
+    ok = all(t.held for t in judged) and bool(judged)
+    return Validation(report(trials, root), root, runs, lacking(judged), ok, keeper=place.keeper, trials=trials)

@@ -173,8 +173,8 @@ def test_what_is_missing_is_every_run_trial_and_point_that_says_nothing():
     ]
     e = evidence([quiet, told], limits={"sph": points}, other_trials=[trial(case("o"), "sph", verdict="timeout")])
     assert e.missing() == [
-        "line_bead, sph, d = 1 mm: timeout: ",
         "q, mpm, d = 10 mm: error: ",
+        "o, sph, d = 10 mm: timeout: ",
         "stability, spacing = 0.5, sph: error: r",
     ]
     bad = [finished(f"m{i}", "error") for i in range(6)]

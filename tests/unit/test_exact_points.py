@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -11,6 +12,7 @@ from fluidbench.method.target import Target
 from fluidbench.method.vitals import Vital
 from fluidbench.registry import get_method
 from fluidbench.study import limits, points, stability
+from fluidbench.study.case import Finding, Number
 from fluidbench.study.limits import Limit, default_dt
 from fluidbench.study.points import (
     AXES,
@@ -26,9 +28,10 @@ from fluidbench.study.points import (
     point_tasks,
     varied,
 )
+from fluidbench.study.trials import evaluate
 
 from ..conftest import bead, scenario
-from .made import BEAD, working
+from .made import BEAD, case, finished, working
 
 WATER = {"density": 1000.0, "sound_speed": 10.0}
 
@@ -231,6 +234,37 @@ def test_a_study_of_stability_ends_well_when_all_holds_or_is_refused(tmp_path, m
     made = stability.stability(BEAD, ["mpm"], axes=["density"], quick=True, out=tmp_path, progress=False)
     assert made.ok is fine and (len(made.points), len(made.blocks), len(made.table)) == (3, 3, 6)
     assert [(len(call), call.workers) for call in calls] == [(3, 2), (3, 2)] and made.runs == []
+
+
+@pytest.mark.parametrize(
+    ("verdict", "error", "fine", "missing"),
+    [
+        ("completed", 0.0, True, []),
+        ("completed", 0.5, False, []),
+        ("diverged", 0.0, False, []),
+        ("timeout", 0.0, False, ["own, mpm, d = 10 mm: timeout: too slow"]),
+    ],
+)
+def test_a_study_of_stability_rests_on_the_cases_of_a_methods_own_numerics(
+    tmp_path, monkeypatch, verdict, error, fine, missing
+):
+    own = case("own", "numerics", about="mpm", scenarios=lambda d: {"": scenario(spacing=d)})
+    own = replace(own, evaluate=lambda runs: Finding(error, (Number("kappa [-]", 1.0, 1.0),)))
+    monkeypatch.setattr(stability, "cases", lambda: {"own": own, "other": replace(own, name="other", about="sph")})
+
+    def run(trials, place, title):
+        for trial in trials:
+            trial.runs = {"": finished(trial.method, verdict, reason="too slow")}
+            evaluate(trial)
+
+    def answer(work):
+        whole = {"dt_limit_s": 1.0, "dt_own_s": 1.0, "dt_theory_s": 1.0}
+        return {"axis": "", "value": 0.0, "method": work.method, "verdict": "held"} | work.task | whole
+
+    monkeypatch.setattr(stability, "run", run)
+    working(monkeypatch, answer)
+    made = stability.stability(BEAD, ["mpm"], axes=["density"], quick=True, out=tmp_path, progress=False)
+    assert (made.ok, made.missing, len(made.runs)) == (fine, missing, 1)
 
 
 def test_a_block_is_measured_bare(monkeypatch):
