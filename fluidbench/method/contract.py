@@ -128,7 +128,8 @@ class Session(ABC):
         return None
 
     def march(self, dt: float, substeps: int) -> None:
-        """Take substeps of a given dt [s], whatever the bounds say: for experiments on stability."""
+        """Take substeps of a given dt [s], whatever the bounds say, with or without `begin`: for experiments on
+        stability."""
         raise NotImplementedError("it picks its own step")
 
     def kick(self, velocity: np.ndarray) -> None:

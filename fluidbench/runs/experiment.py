@@ -28,10 +28,11 @@ class Experiment(Work):
     method: str
     task: dict[str, Any]
     target: Target = HERE
+    wall_limit: float | None = None  # [s]
 
     @property
-    def limit(self) -> None:
-        return None
+    def limit(self) -> float | None:
+        return self.wall_limit
 
     @property
     def name(self) -> str:

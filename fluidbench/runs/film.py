@@ -64,6 +64,8 @@ class Film:
         waiting = wait(self.drawn, timeout=PATIENCE).not_done
         reasons = [str(f.exception()) for f in self.drawn if f.done() and f.exception() is not None]
         if self.pool is not None:
+            for stuck in multiprocessing.active_children() if waiting else ():
+                stuck.kill()  # this process could not end before them
             self.pool.shutdown(wait=not waiting, cancel_futures=True)
         missing = sum(not (self.folder / f"frame_{i:05d}.png").is_file() for i in range(self.shots))
         why = reasons[0] if reasons else "drawing took too long"

@@ -21,9 +21,6 @@ USERS = {
 """Keys that only some shapes use."""
 CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
 
-GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 33)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-"""Places where a field of velocities is looked at, over the half edges of a body."""
-
 
 class Wave(Model):
     """A velocity field amplitude sin(number . (x - center) + phase)."""
@@ -133,13 +130,9 @@ class Body(Model):
 
     @property
     def top_speed(self) -> float:
-        """The fastest initial speed, at the corners of the bounding box; within it, too, where there is a field, and at
-        every point where they are given [m/s]."""
-        if self.positions is not None:
-            given = 0.0 if self.velocities is None else self.velocities.array
-            return float(np.linalg.norm(self.velocity_at(self.positions.array) + given, axis=1).max())
-        places = CORNERS if self.velocity_field is None else GRID
-        corners = np.asarray(self.center) + places * self.extent
+        """The fastest initial speed of a shape without a `velocity_field`: at the corners of its bounding box, on the
+        crest of its wave [m/s]."""
+        corners = np.asarray(self.center) + CORNERS * self.extent
         still = self.model_copy(update={"wave": None}).velocity_at(corners)
         crest = 0.0 if self.wave is None else float(np.linalg.norm(self.wave.amplitude))
         return float(np.linalg.norm(still, axis=1).max()) + crest

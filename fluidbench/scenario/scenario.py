@@ -5,22 +5,24 @@ It is read from TOML (`load`), or built in Python from the same classes.
 """
 
 import math
-from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import quoted
-from .body import CORNERS, GRID, Body
+from .body import CORNERS, Body
 from .collider import Collider
 from .domain import Domain
-from .expression import evaluate
 from .extent import check_size, check_time
 from .material import Material
 from .model import Matrix, Model, Positive, Vector
 from .nozzle import Nozzle
 from .toolpath import Toolpath, Track
+
+if TYPE_CHECKING:
+    from .layout import Layout
 
 LONGEST_NAME = 80
 VOLUMES = 2.0  # largest factor between a particle's own volume and spacing^3
@@ -81,8 +83,9 @@ class Scenario(Model):
     def _consistent(self) -> "Scenario":
         for check in (
             self._check_source,
+            partial(check_size, self),
             self._check_fields,
-            self._check_extent,
+            partial(check_time, self),
             self._check_nozzle,
             self._check_bodies,
             self._check_periodic,
@@ -97,10 +100,6 @@ class Scenario(Model):
             raise ValueError("nozzle and toolpath belong together: give both or neither")
         if self.nozzle is None and not self.bodies:
             raise ValueError("nothing to simulate: give bodies, or a nozzle with a toolpath")
-
-    def _check_extent(self) -> None:
-        check_size(self)
-        check_time(self)
 
     def _check_nozzle(self) -> None:
         if self.nozzle is None or self.track is None:
@@ -144,22 +143,21 @@ class Scenario(Model):
             )
 
     def _check_fields(self) -> None:
-        """What expressions and arrays come to, looked at within each body; before anything is derived of them."""
+        """What expressions and arrays come to at the very particles; before anything is derived of them."""
         for i, body in enumerate(self.bodies):
             if body.where is not None or body.velocity_field is not None or body.positions is not None:
-                self._check_field(i, body)
+                found = self._laid(body)
+                if not len(found.position):
+                    where = " where it is to be" * (body.where is not None)
+                    raise ValueError(f"bodies.{i}: no place of it is inside the domain{where}")
+                if not np.isfinite(found.velocity).all():
+                    raise ValueError(f"bodies.{i}.velocity_field: it is no number somewhere in the body")
 
-    def _check_field(self, i: int, body: Body) -> None:
-        points = np.asarray(body.center) + GRID * body.extent if body.positions is None else body.positions.array
-        inside = self.domain.contains(points)
-        if body.where is not None:
-            inside &= evaluate(body.where, points) > 0
-        if not inside.any():
-            raise ValueError(
-                f"bodies.{i}: no place of it is inside the domain" + " where it is to be" * bool(body.where)
-            )
-        if not np.isfinite(body.velocity_at(points[inside])).all():
-            raise ValueError(f"bodies.{i}.velocity_field: it is no number somewhere in the body")
+    def _laid(self, body: Body) -> "Layout":
+        """The body as particles."""
+        from .layout import lay_out
+
+        return lay_out(body, self)
 
     def _check_periodic(self) -> None:
         for axis, periodic in enumerate(self.domain.walls.periodic()):
@@ -231,7 +229,7 @@ class Scenario(Model):
             speeds.append(math.hypot(self.nozzle.speed, self.toolpath.speed))
             height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
         for body in self.bodies:
-            speeds.append(body.top_speed)
+            speeds.append(self._top_speed(body))
             speeds.append(math.sqrt(np.abs(self.gradient).max()) * float(np.linalg.norm(body.extent)))
             height = max(height, float(body.center[2] + body.extent[2]) - self.domain.lower[2])
         if (expansion := self.material.expansion) is not None:
@@ -239,6 +237,13 @@ class Scenario(Model):
             sizes += [self.nozzle.diameter / 2] if self.nozzle is not None else []
             speeds.append(expansion.speed(max(sizes)))
         return max(*speeds, math.sqrt(g * height))
+
+    def _top_speed(self, body: Body) -> float:
+        """The fastest initial speed [m/s]: of the body's particles where these are given, or their speeds are by
+        expressions, which may vary faster than any grid would show; at the corners of its box otherwise."""
+        if body.positions is None and body.velocity_field is None:
+            return body.top_speed
+        return float(np.linalg.norm(self._laid(body).velocity, axis=1).max())
 
     @property
     def liquid_sound_speed(self) -> float:

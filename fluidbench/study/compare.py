@@ -52,6 +52,8 @@ def compare(
     Raises UserError for what cannot be run, before anything is.
     """
     backends = names_of(backends, "backends")
+    if backends and "backend" in options:
+        raise UserError("backend, backends: give one or the other")
     resolved, names = as_scenario(scenario, quick), methods_of(methods, options, backends)
     require_number(checkpoint_every, "checkpoint_every", 0.0)
     if render_every is not None:

@@ -28,6 +28,8 @@ def report(runs: Sequence[Run], root: Path, verb: str) -> Report:
 
     made = (fidelity(runs), successes(runs), against_reference(runs), costs(runs), backends(runs))
     first = next((run for run in runs if run.record.input is not None), None)
+    expected = first.scenario.warnings() if first else []
+    met = [f"{run.label}: {line}" for run in runs for line in run.record.warnings if line not in expected]
     return Report(
         verb,
         f"fluidbench {verb.partition('-')[0]}: {runs[0].record.scenario}",
@@ -38,9 +40,12 @@ def report(runs: Sequence[Run], root: Path, verb: str) -> Report:
         plots(runs),
         {"records": [record_link(run, root, f"{run.label} #{run.record.repeat + 1}") for run in runs]},
         machine_of(runs),
-        alarms=failed_prints(runs),
+        alarms=[*failed_prints(runs), *met],
         failures=[f"{run.label}: {run.verdict}: {run.reason}; {ADVICE[run.verdict]}" for run in runs if not run.ok],
-        notes=[f"{run.label}: {line}" for run in runs if run.record.repeat == 0 for line in run.record.approximations],
+        notes=[
+            *expected,
+            *(f"{run.label}: {line}" for run in runs if run.record.repeat == 0 for line in run.record.approximations),
+        ],
         images=views(runs),
         prefix="" if verb == "compare" else f"{verb}-",
     )

@@ -79,10 +79,8 @@ def failed_prints(results: Sequence[Run]) -> list[str]:
 
 def costs(results: Sequence[Run]) -> Table:
     """What it cost, compilation apart."""
-    groups = {
-        n: [r.cost for r in g if r.cost is not None and evidence_of(r.verdict) is Evidence.RESULT]
-        for n, g in by_method(results).items()
-    }
+    sound = {n: [r for r in g if evidence_of(r.verdict) is Evidence.RESULT] for n, g in by_method(results).items()}
+    groups = {n: [r.cost for r in g if r.cost is not None] for n, g in sound.items()}
     table = Table("Cost (without compilation)", ["", *groups])
     for key in (
         "wall_s",
@@ -103,7 +101,7 @@ def costs(results: Sequence[Run]) -> Table:
             g if key != "bytes_per_particle" or any(c.bytes_per_particle for c in g) else [] for g in groups.values()
         ]
         table.rows.append([label(key), *[spread([getattr(c, key) for c in g]) if g else "-" for g in known]])
-    table.rows.append(["binding bound", *[g[0].binding or "-" for g in by_method(results).values()]])
+    table.rows.append(["binding bound", *[g[0].binding or "-" if g else "-" for g in sound.values()]])
     return table
 
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 from ..runs.job import Job
 from ..scenario import Scenario
 from .result import Result
 from .select_report import report
-from .selection import FACTORS, Selection, _valid, assess
+from .selection import FACTORS, Selection, assess
 from .workplace import Options, Workplace, as_scenario, methods_of, require_number
 
 WALL_LIMIT = 900.0  # s
@@ -63,3 +63,13 @@ def candidates(scenario: Scenario, methods: Sequence[str], place: Workplace) -> 
         for table in tables
         if _valid(table)
     ]
+
+
+def _valid(table: dict[str, Any]) -> bool:
+    from pydantic import ValidationError
+
+    try:
+        Scenario.model_validate(table)
+    except ValidationError:
+        return False
+    return True

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -140,16 +139,6 @@ def trust_of(scenario: Scenario, methods: Sequence[str]) -> dict[str, Trust]:
         own = [row["error"] <= row["tolerance"] for row in near if row["method"] == method]
         found[method] = Trust(sum(own), len(own))
     return found
-
-
-def _valid(table: dict[str, Any]) -> bool:
-    from pydantic import ValidationError
-
-    try:
-        Scenario.model_validate(table)
-    except ValidationError:
-        return False
-    return True
 
 
 def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> Selection:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
 
 from ..method.verdict import lacking
+from ..runs.experiment import Experiment
 from ..scenario import Scenario
 from .case import cases
 from .points import ERROR, HELD, REFUSED, block_tasks, choose, measure_blocks, measure_points, point_tasks
@@ -46,8 +47,12 @@ def stability(
     resolved, names = as_scenario(scenario), methods_of(methods, options)
     chosen, place = choose(names_of(axes, "axes") or [], names), Workplace.of(options, WALL_LIMIT, names)
     blocks, points = block_tasks(names, quick, place.target), point_tasks(resolved, chosen, names, quick, place.target)
-    measured = measure_blocks(blocks, lambda work: place.run(work, "blocks", together=True))
-    rows = measure_points(points, lambda work: place.run(work, "points", together=True))
+
+    def limited(work: Sequence[Experiment], title: str) -> list[Any]:
+        return place.run([replace(one, wall_limit=place.wall_limit) for one in work], title, together=True)
+
+    measured = measure_blocks(blocks, lambda work: limited(work, "blocks"))
+    rows = measure_points(points, lambda work: limited(work, "points"))
     own = [case for case in cases().values() if case.about in names and place.target.device == "cpu"]
     trials = [t for c in own for t in plan([c], [c.about], ["coarse"], False, place.target, place.wall_limit)]
     if trials:

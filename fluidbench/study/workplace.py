@@ -93,7 +93,7 @@ class Workplace:
         target = one_target(device, options.get("backend", DEFAULT_BACKEND), options.get("threads", 1))
         for method in methods:
             check_backend(get_method(method), target)
-        workers, executor = len(gpus) or workers_for(options.get("jobs"), target), options.get("executor")
+        workers, executor = workers_for(options.get("jobs") or len(gpus) or None, target), options.get("executor")
         if isinstance(executor, str):
             check_executor(executor)
         elif executor is not None:
@@ -126,7 +126,13 @@ def as_scenario(given: Scenario | str | Path, quick: bool = False) -> Scenario:
     """A scenario, or the one meant by a name or a file."""
     if not isinstance(given, Scenario | str | Path):
         raise UserError(f"a scenario, a name or a file is wanted (got {quoted(given)})")
-    return given if isinstance(given, Scenario) else load(given, quick=quick)
+    if isinstance(given, Scenario):
+        if quick:
+            raise UserError(
+                "quick: a scenario given as an object is run as it is; load it with quick=True, or set spacing"
+            )
+        return given
+    return load(given, quick=quick)
 
 
 def names_of(given: Any, what: str) -> list[Any] | None:

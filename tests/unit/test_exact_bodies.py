@@ -89,7 +89,8 @@ def test_a_field_of_velocities_is_added_and_counts_for_the_speed():
     x, _, z = laid.position.T
     expected = np.stack([0.5 + 10 * (x - 0.1), 0 * x, np.sin(np.pi * (z - 0.1) / 0.1)], axis=1)
     assert laid.velocity == pytest.approx(expected) and len(x) == 1000
-    assert s.reference_speed == pytest.approx(math.hypot(1.0, 1.0), rel=1e-3)  # 0.5 + 0.5 at the side, 1 at z = 0.15
+    fastest = math.hypot(0.5 + 10 * 0.045, math.sin(math.pi * 0.45))  # of the particles next to the corner
+    assert s.reference_speed == pytest.approx(fastest, rel=1e-6)
 
 
 def test_where_cuts_a_shape_and_leaves_each_particle_its_volume():
@@ -100,6 +101,14 @@ def test_where_cuts_a_shape_and_leaves_each_particle_its_volume():
     assert len(x) == emitted(s) == pytest.approx(500, abs=60)
 
 
+def test_the_speed_of_a_field_is_that_of_its_particles():
+    """A field of ten waves, whose nodes lie on any even grid: its crests are between them."""
+    field = ["9 * sin(100 * pi * x)", "0", "0"]
+    s = scenario(bodies=[BOX | {"velocity_field": field}])
+    laid = lay_out(s.bodies[0], s)
+    assert s.reference_speed == pytest.approx(np.linalg.norm(laid.velocity, axis=1).max()) == pytest.approx(9.0)
+
+
 def test_points_are_taken_as_they_are(tmp_path):
     x = np.array([[0.05, 0.05, 0.05], [0.1, 0.12, 0.14], [0.5, 0.1, 0.1]])  # the last lies outside the domain
     v, w = np.arange(9.0).reshape(3, 3), np.array([1e-6, 1.5e-6, 1e-6])
@@ -107,7 +116,8 @@ def test_points_are_taken_as_they_are(tmp_path):
     s = scenario(bodies=[body])
     assert Scenario.model_validate(json.loads(json.dumps(s.model_dump(mode="json")))) == s
     assert body.center == pytest.approx((0.275, 0.085, 0.095)) and body.extent == pytest.approx([0.225, 0.035, 0.045])
-    assert body.top_speed == pytest.approx(np.linalg.norm([6, 7, 9]))
+    # of those inside the domain, against sqrt(g H) and the gradient's none
+    assert s.reference_speed == pytest.approx(np.linalg.norm([3, 4, 6]))
     laid = lay_out(body, s)
     assert laid.position == pytest.approx(x[:2]) and laid.volume == pytest.approx(w[:2])
     assert laid.velocity == pytest.approx(v[:2] + np.array([0.0, 0.0, 1.0]))
@@ -174,7 +184,7 @@ def test_an_expression_leaves_the_places_alone(text):
         ({"where": "x > 100"}, "no place of it is inside the domain where it is to be"),
         ({"where": "log(-1) > 0"}, "no place of it is inside"),
         ({"velocity_field": ["log(-1)", "0", "0"]}, "it is no number somewhere in the body"),
-        ({"velocity_field": ["1 / (x - 0.1)", "0", "0"]}, "it is no number somewhere in the body"),
+        ({"velocity_field": ["1 / (x - x)", "0", "0"]}, "it is no number somewhere in the body"),
     ],
 )
 def test_a_body_that_is_none_is_refused(change, words):

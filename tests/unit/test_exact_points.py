@@ -231,7 +231,8 @@ def test_a_study_of_stability_ends_well_when_all_holds_or_is_refused(tmp_path, m
         return {"axis": work.task["axis"], "value": work.task["value"], "method": work.method, "verdict": verdict}
 
     calls = working(monkeypatch, answer)
-    made = stability.stability(BEAD, ["mpm"], axes=["density"], quick=True, out=tmp_path, progress=False)
+    made = stability.stability(BEAD, ["mpm"], axes=["density"], quick=True, out=tmp_path, progress=False, wall_limit=7)
+    assert {work.limit for call in calls for work in call} == {7}
     assert made.ok is fine and (len(made.points), len(made.blocks), len(made.table)) == (3, 3, 6)
     assert [(len(call), call.workers) for call in calls] == [(3, 2), (3, 2)] and made.runs == []
 

@@ -230,6 +230,7 @@ def test_options_that_there_are_not_are_refused():
         ({"repeats": 1.5}, "a whole number"),
         ({"out": ""}, "a folder is wanted"),
         ({"backends": ["warp", "warp"]}, "named twice"),
+        ({"backends": ["warp"], "backend": "taichi"}, "give one or the other"),
         ({"device": 0}, "a name is wanted"),
         ({"verb": "../evil"}, "a plain name"),
         ({"render_every": 0}, "render_every"),
@@ -259,6 +260,8 @@ def test_a_workplace_is_checked_before_anything_is_written(tmp_path):
 def test_a_scenario_is_given_as_it_is_or_meant(tmp_path):
     own = scenario()
     assert as_scenario(own) is own and as_scenario("line_bead").spacing == 1.5e-3
+    with pytest.raises(UserError, match="quick: a scenario given as an object"):
+        as_scenario(own, quick=True)
     assert as_scenario("line_bead", quick=True).spacing == pytest.approx(2e-3)
     path = Path(tmp_path / "mine.toml")
     path.write_text(
