@@ -10,7 +10,7 @@ import warp as wp
 
 from fluidbench.native.scene import FRICTION, SLIP, Box
 
-from .neighbours import face_kind
+from .images import face_kind
 
 wp.set_module_options({"enable_backward": False})
 

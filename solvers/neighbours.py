@@ -1,27 +1,29 @@
-"""Neighbour lists for SPH and PBD: a hash grid feeds lists that are reused until something has moved half a skin.
+"""Neighbour lists for SPH and PBD: kept until something has moved half a skin.
 
-Walls and periodic axes enter as images: a neighbour is a particle, or its image in a face. One list entry holds the
-index in its low 26 bits and the image code cx + 3 cy + 9 cz above them, c = 0 for none, 1 for the lower face's image,
-2 for the upper one's. A mirror image completes the kernel at a wall exactly; a periodic image is a shift.
+On the CPU eight particles that are side by side in memory share a list, on a GPU each has its own: see pairs.py, which
+reads them. A list holds all that is within reach of any of its particles: first what lies inside, they themselves too,
+then images (images.py).
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import warp as wp
 
 from fluidbench.native.pool import Pool
-from fluidbench.native.scene import PERIODIC, STICK, Box, Scene
+from fluidbench.native.scene import Scene
 from fluidbench.scenario.expansion import Expansion
 
+from . import cells, search
 from .backends import Backend
+from .order import CellOrder
 
-wp.set_module_options({"enable_backward": False})
-INDEX_BITS = wp.constant(26)
-INDEX_MASK = wp.constant(2**26 - 1)
-FAULT_NEIGHBOURS = 4
 ROOM = 1.7  # how much denser than a lattice matter may get before its lists overflow
-WALL_INSET = wp.constant(0.2)  # closest approach to a wall, in particle spacings; at rest the first layer is at 0.5
+LANES = 8  # particles that share a list on the CPU: as many floats as its vector registers hold
+FEWEST, MOST = 4, 32  # threads that share a particle on a GPU
+BUSY = 2**18  # threads that keep a large GPU busy
+WORTHWHILE = 11  # entries that a thread goes through at least
 
 
 def crowded(expansion: Expansion) -> str | None:
@@ -35,271 +37,56 @@ def crowded(expansion: Expansion) -> str | None:
     )
 
 
-@wp.struct
-class Lists:
-    """Entry k of particle i is entries[i * row + k * column], for k < number[i]."""
-
-    entries: wp.array(dtype=int)
-    number: wp.array(dtype=int)
-    row: int
-    column: int
-
-
-@wp.func
-def image_code(code: int, axis: int):
-    """0, 1 or 2: which image the code means on one axis."""
-    digit = code
-    if axis == 1:
-        digit = code / 3
-    elif axis == 2:
-        digit = code / 9
-    return digit % 3
-
-
-@wp.func
-def image_position(box: Box, x: wp.vec3, code: int):
-    """The image of a point; undoing a periodic shift needs the opposite code."""
-    out = x
-    for axis in range(3):
-        c = image_code(code, axis)
-        if c == 1:
-            if box.lower_kind[axis] == PERIODIC:
-                out[axis] = x[axis] - (box.upper[axis] - box.lower[axis])
-            else:
-                out[axis] = 2.0 * box.lower[axis] - x[axis]
-        elif c == 2:
-            if box.upper_kind[axis] == PERIODIC:
-                out[axis] = x[axis] + (box.upper[axis] - box.lower[axis])
-            else:
-                out[axis] = 2.0 * box.upper[axis] - x[axis]
-    return out
-
-
-@wp.func
-def face_kind(box: Box, code: int, axis: int):
-    """Kind of the wall that the code mirrors in on this axis; PERIODIC where it mirrors in none."""
-    c = image_code(code, axis)
-    kind = int(PERIODIC)
-    if c == 1:
-        kind = box.lower_kind[axis]
-    elif c == 2:
-        kind = box.upper_kind[axis]
-    return kind
-
-
-@wp.func
-def image_velocity(box: Box, v: wp.vec3, code: int):
-    """A velocity seen in the walls: slip and friction mirror the normal component, stick turns all of them round."""
-    out = v
-    for axis in range(3):
-        kind = face_kind(box, code, axis)
-        if kind == STICK:
-            out = -out
-        elif kind != PERIODIC:
-            out[axis] = -out[axis]
-    return out
-
-
-@wp.func
-def image_gradient(box: Box, g: wp.vec3, code: int):
-    """The gradient of a scalar seen in the walls: mirrors turn its normal component round."""
-    out = g
-    for axis in range(3):
-        if face_kind(box, code, axis) != PERIODIC:
-            out[axis] = -out[axis]
-    return out
-
-
-@wp.func
-def image_rate(box: Box, g: wp.mat33, code: int):
-    """A velocity gradient dv_i/dx_j seen in the walls, consistent with `image_velocity`."""
-    out = g
-    for axis in range(3):
-        kind = face_kind(box, code, axis)
-        if kind != PERIODIC:
-            for b in range(3):
-                out[b, axis] = -out[b, axis]
-            if kind == STICK:
-                out = -1.0 * out
-            else:
-                for b in range(3):
-                    out[axis, b] = -out[axis, b]
-    return out
-
-
-@wp.func
-def contained(box: Box, x: wp.vec3, inset: float):
-    """A position wrapped along periodic axes and kept `inset` in front of walls, so it never meets its own image."""
-    out = x
-    for axis in range(3):
-        low, high = box.lower[axis], box.upper[axis]
-        if box.lower_kind[axis] == PERIODIC:
-            if x[axis] < low:
-                out[axis] = x[axis] + (high - low)
-            elif x[axis] >= high:
-                out[axis] = x[axis] - (high - low)
-        else:
-            out[axis] = wp.clamp(x[axis], low + inset, high - inset)
-    return out
-
-
-@wp.kernel
-def watch(
-    capacity: int,
-    count: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3),
-    listed: wp.array(dtype=wp.vec3),
-    limit2: float,
-    # outputs
-    outdated: wp.array(dtype=int),
-):
-    """Mark the lists outdated once a particle has moved half the skin since they were made."""
-    i = wp.tid()
-    if i % capacity < count[i / capacity]:
-        if wp.length_sq(position[i] - listed[i]) > limit2:
-            outdated[0] = 1
-
-
-@wp.kernel
-def mark_worlds(capacity: int, worlds: int, count: wp.array(dtype=int), group: wp.array(dtype=int)):
-    """The world of each slot; unused slots belong to a world of their own."""
-    i = wp.tid()
-    group[i] = i / capacity
-    if i % capacity >= count[i / capacity]:
-        group[i] = worlds
-
-
-@wp.func
-def near_faces(box: Box, x: wp.vec3, reach: float, periodic: bool):
-    """Per axis, bits 1 and 2 for the lower and upper face whose images (periodic, or mirrored) may come within reach;
-    bit 4, always set, for no image."""
-    near = wp.vec3i(4, 4, 4)
-    for axis in range(3):
-        if (box.lower_kind[axis] == PERIODIC) == periodic:
-            if x[axis] - box.lower[axis] < reach:
-                near[axis] = near[axis] + 1
-            if box.upper[axis] - x[axis] < reach:
-                near[axis] = near[axis] + 2
-    return near
-
-
-@wp.func
-def has_choice(near: wp.vec3i, code: int):
-    """Whether all of the faces that a code uses are near."""
-    zero = (code % 3 == 0) or (near[0] & (code % 3)) != 0
-    one = ((code / 3) % 3 == 0) or (near[1] & ((code / 3) % 3)) != 0
-    two = (code / 9 == 0) or (near[2] & (code / 9)) != 0
-    return zero and one and two
-
-
-@wp.func
-def opposite(code: int):
-    """The code that undoes a periodic shift."""
-    back = int(0)
-    power = int(1)
-    for axis in range(3):
-        back += ((3 - image_code(code, axis)) % 3) * power
-        power *= 3
-    return back
-
-
-@wp.kernel
-def fill_lists(
-    grid: wp.uint64,
-    box: Box,
-    group: wp.array(dtype=int),
-    worlds: int,
-    reach: float,
-    limit: int,
-    row: int,
-    column: int,
-    position: wp.array(dtype=wp.vec3),
-    # outputs
-    entries: wp.array(dtype=int),
-    number: wp.array(dtype=int),
-    listed: wp.array(dtype=wp.vec3),
-    fault: wp.array(dtype=int),
-    outdated: wp.array(dtype=int),
-):
-    """All neighbours within reach, images included.
-
-    Periodic images are found by asking the grid at the shifted place. Mirror images need no search: a particle is
-    never farther away than its image, so they are among the particles just found, or the particle itself.
-    """
-    i = wp.tid()
-    world = group[i]
-    n = int(0)
-    if world < worlds:
-        x = position[i]
-        listed[i] = x
-        reach2 = reach * reach
-        shifts = near_faces(box, x, reach, True)
-        mirrors = near_faces(box, x, reach, False)
-        most_shifts, most_mirrors = int(1), int(1)
-        if shifts[0] + shifts[1] + shifts[2] > 12:
-            most_shifts = 27
-        if mirrors[0] + mirrors[1] + mirrors[2] > 12:
-            most_mirrors = 27
-        for shift in range(most_shifts):
-            if has_choice(shifts, shift):
-                first = n
-                at = image_position(box, x, opposite(shift))
-                query = wp.hash_grid_query(grid, at, reach, world)
-                for j in query:
-                    if wp.length_sq(position[j] - at) < reach2 and (j != i or shift > 0):
-                        if n < limit:
-                            entries[i * row + n * column] = j + (shift << INDEX_BITS)
-                        n += 1
-                last = wp.min(n, limit)
-                for face in range(1, most_mirrors):
-                    if has_choice(mirrors, face):
-                        code = shift + face
-                        if shift == 0 and wp.length_sq(image_position(box, x, code) - x) < reach2:
-                            if n < limit:
-                                entries[i * row + n * column] = i + (code << INDEX_BITS)
-                            n += 1
-                        for k in range(first, last):
-                            j = entries[i * row + k * column] & INDEX_MASK
-                            if wp.length_sq(image_position(box, position[j], code) - x) < reach2:
-                                if n < limit:
-                                    entries[i * row + n * column] = j + (code << INDEX_BITS)
-                                n += 1
-        if n > limit:
-            wp.atomic_or(fault, 0, FAULT_NEIGHBOURS)
-            n = limit
-    number[i] = n
-    if i == 0:
-        outdated[0] = 0
-
-
 class Neighbours:
     """Lists of all pairs within `radius`, valid while nothing has moved more than half of `skin` (both [m])."""
 
     def __init__(self, scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> None:
         self.scene, self.pool, self.backend = scene, pool, backend
-        self.limit = limit = room((radius + skin) / scene.spacing)
         self.reach, self.half_skin2 = radius + skin, (0.5 * skin) ** 2
-        # On the CPU a particle's list is contiguous; on a GPU the k-th entries of neighbouring threads are.
-        self.row, self.column = (limit, 1) if scene.device.is_cpu else (1, pool.size)
+        self.group = LANES if scene.device.is_cpu and backend.name == "warp" else 1
+        self.groups = pool.size // self.group
+        self.limit = self.group * room(self.reach / scene.spacing)
         with wp.ScopedDevice(scene.device):
-            self.entries = wp.empty(pool.size * limit, dtype=int)
-            self.number = wp.zeros(pool.size, dtype=int)
+            self.entries = wp.empty(self.groups * self.limit, dtype=int)
+            self.number = wp.zeros(self.groups, dtype=int)
+            self.inside = wp.zeros(self.groups, dtype=int)
             self.listed = wp.zeros(pool.size, dtype=wp.vec3)
             self.outdated = wp.ones(1, dtype=int)
-        self.lists = Lists()
-        self.lists.entries, self.lists.number = self.entries, self.number
-        self.lists.row, self.lists.column = self.row, self.column
-        self._allocate_grid()
+        lists = self.lists = search.Lists()
+        lists.entries, lists.number, lists.inside, lists.group = self.entries, self.number, self.inside, self.group
+        lists.threads = (
+            1
+            if scene.device.is_cpu or backend.name != "warp"
+            else threads_for(pool.size, room(self.reach / scene.spacing) / ROOM)
+        )
+        # On the CPU a list is contiguous; on a GPU what neighbouring threads read at a time is.
+        contiguous = self.limit, 1
+        lists.row, lists.column = contiguous if scene.device.is_cpu else (lists.threads, pool.size * lists.threads)
+        self._allocate_cells()
 
-    def _allocate_grid(self) -> None:
+    def _allocate_cells(self) -> None:
+        size, grid = self.pool.size, cells.Cells()
+        grid.width = self.reach
+        box = self.scene.box
+        across = [(box.upper[axis] - box.lower[axis]) / self.reach for axis in range(3)]
+        sides = sides_for(across, self.pool.capacity)
+        grid.sides = wp.vec3i(*sides)
         with wp.ScopedDevice(self.scene.device):
-            self.group = wp.zeros(self.pool.size, dtype=int)
-            self.grid = wp.HashGrid(*_grid_shape(self.pool.size))
-            self.grid.reserve(self.pool.size, with_groups=True)
+            grid.spot = wp.zeros(size, dtype=wp.vec4)
+            grid.start, grid.number = (wp.zeros(self.pool.worlds * math.prod(sides), dtype=int) for _ in range(2))
+            grid.bucket, grid.arrived, grid.members = (wp.zeros(size, dtype=int) for _ in range(3))
+            grid.handed = wp.zeros(1, dtype=int)
+        self.cells = grid
+
+    @property
+    def work(self) -> int:
+        """Threads of a launch that sums over all pairs."""
+        return self.groups * self.lists.threads
 
     def prepare(self) -> None:
         """Compile the search."""
-        wp.load_module(__name__, device=self.scene.device)
+        for module in (cells, search):
+            wp.load_module(module, device=self.scene.device)
 
     def refresh(self) -> None:
         """The pool was changed from outside: make the lists anew at the next substep."""
@@ -309,49 +96,51 @@ class Neighbours:
         """Enqueue the check of the lists and, on the device's own decision, their renewal."""
         pool = self.pool
         self.backend.launch(
-            watch, pool.size, [pool.capacity, pool.count, pool.position, self.listed, self.half_skin2], [self.outdated]
+            search.watch,
+            pool.size,
+            [pool.capacity, pool.count, pool.position, self.listed, self.half_skin2],
+            [self.outdated],
         )
-        if self.scene.device.is_cpu:
-            wp.capture_if(self.outdated, on_true=self._renew)
-        else:
-            # The grid's sort cannot be part of a CUDA conditional: it is built at every substep, the lists are not.
-            self._build()
-            wp.capture_if(self.outdated, on_true=self._fill)
+        wp.capture_if(self.outdated, on_true=self._renew)
 
     def _renew(self) -> None:
-        self._build()
-        self._fill()
-
-    def _build(self) -> None:
-        pool = self.pool
-        self.backend.launch(mark_worlds, pool.size, [pool.capacity, pool.worlds, pool.count], [self.group])
-        self.grid.build(pool.position, self.reach, groups=self.group)
-
-    def _fill(self) -> None:
-        pool = self.pool
+        pool, grid = self.pool, self.cells
+        buckets = grid.number.shape[0]
+        self.backend.launch(cells.empty, buckets, [grid])
+        self.backend.launch(cells.tally, pool.size, [pool.capacity, pool.count, pool.position, grid])
+        self.backend.launch(cells.hand_out, buckets, [grid])
+        self.backend.launch(cells.gather, pool.size, [grid])
+        self.backend.launch(cells.rank, pool.size, [pool.position, grid])
+        on_cpu = self.scene.device.is_cpu
         self.backend.launch(
-            fill_lists,
-            pool.size,
+            search.fill_lists if on_cpu else search.fill_in_teams,
+            self.groups if on_cpu else self.groups * search.TEAM,
             [
-                self.grid.id,
                 self.scene.box,
-                self.group,
-                pool.worlds,
+                pool.capacity,
+                pool.count,
                 self.reach,
                 self.limit,
-                self.row,
-                self.column,
+                grid,
                 pool.position,
+                self.lists,
             ],
-            [self.entries, self.number, self.listed, pool.fault, self.outdated],
+            [self.listed, pool.fault, self.outdated],
         )
 
     def carried(self) -> dict[str, wp.array]:
         """The lists as they are: made anew, they would be summed over in another order."""
-        return {name: getattr(self, name) for name in ("entries", "number", "listed", "outdated")}
+        return {name: getattr(self, name) for name in ("entries", "number", "inside", "listed", "outdated")}
 
     def footprint(self) -> dict[str, int]:
-        return {"neighbour lists": self.entries.capacity + self.number.capacity + self.listed.capacity}
+        lists = (self.entries, self.number, self.inside, self.listed)
+        return {
+            "neighbour lists": sum(array.capacity for array in lists),
+            "neighbour cells": sum(array.capacity for array in self._cell_arrays()),
+        }
+
+    def _cell_arrays(self) -> list[wp.array]:
+        return [getattr(self.cells, name) for name in ("bucket", "spot", "start", "number", "arrived", "members")]
 
 
 def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> Neighbours:
@@ -363,12 +152,28 @@ def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, ski
     return Neighbours(scene, pool, backend, radius, skin)
 
 
+def side_by_side(scene: Scene, pool: Pool) -> CellOrder:
+    """The order of memory in which those that share a list are closest: cells that hold so many particles at rest."""
+    return CellOrder(scene, pool, LANES ** (1.0 / 3.0) * scene.spacing)
+
+
 def room(reach_ratio: float) -> int:
     """Entries to allow for: 1.7 times those of a lattice. Odd multiples of 8, lest rows collide in the cache."""
-    return 16 * int(np.ceil(ROOM * 4.0 / 3.0 * np.pi * reach_ratio**3 / 16.0)) + 8
+    return 16 * math.ceil(ROOM * 4.0 / 3.0 * math.pi * reach_ratio**3 / 16.0) + 8
 
 
-def _grid_shape(particles: int) -> tuple[int, int, int]:
-    """Hash cells for that many particles: about one a particle, no fewer than 32 an axis."""
-    side = int(np.clip(2 ** np.ceil(np.log2(max(particles, 1)) / 3), 32, 256))
-    return (side, side, side)
+def sides_for(across: Sequence[float], particles: int) -> list[int]:
+    """Cells of a grid on each axis: as many as there are in the domain, or so many that there is one a particle; powers
+    of two, and at least 4, so that no two of the 27 around a particle share a bucket."""
+    sides = [max(4, 1 << math.ceil(math.log2(max(cells + 2.0, 1.0)))) for cells in across]
+    while math.prod(sides) > max(2 * particles, 64) and max(sides) > 4:
+        sides[sides.index(max(sides))] //= 2
+    return sides
+
+
+def threads_for(particles: int, entries: float) -> int:
+    """Threads that share a particle on a GPU: more where particles alone would leave it idle, as long as each has
+    enough of the particle's entries to go through."""
+    wanted = 2 ** math.ceil(math.log2(max(BUSY / particles, 1.0)))
+    worth = 2 ** math.floor(math.log2(max(entries / WORTHWHILE, 1.0)))
+    return int(np.clip(min(wanted, worth), FEWEST, MOST))

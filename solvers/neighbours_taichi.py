@@ -8,7 +8,9 @@ import warp as wp
 
 from fluidbench.native.scene import PERIODIC, STICK, Box
 
-from .neighbours import FAULT_NEIGHBOURS, INDEX_BITS, INDEX_MASK, Lists, Neighbours
+from .images import INDEX_BITS, INDEX_MASK
+from .neighbours import Neighbours
+from .search import FAULT_NEIGHBOURS, Lists
 from .taichi_bridge import Ints, Vectors, ivec3, struct_of, ti, vec3
 
 BoxT, ListsT = struct_of(Box), struct_of(Lists)
@@ -205,6 +207,7 @@ def fill_lists(
     members: Ints,
     entries: Ints,
     number: Ints,
+    inside: Ints,
     listed: Vectors,
     fault: Ints,
     outdated: Ints,
@@ -230,19 +233,17 @@ def fill_lists(
                         bucket = bucket_of(wanted, start.shape[0])
                         for m in range(start[bucket], start[bucket] + filled[bucket]):
                             j = members[m]
-                            if key[j] == wanted and (j != i or shift > 0):
+                            if key[j] == wanted:
                                 if (position[j] - back).norm_sqr() < reach2:
                                     if n < limit:
                                         entries[i * row + n * column] = j | (shift << INDEX_BITS)
                                     n += 1
                     last = ti.min(n, limit)
+                    if shift == 0:
+                        inside[i] = last
                     for face in range(1, 27 if mirrors.sum() > 0 else 1):
                         if allowed(mirrors, face):
                             code = shift + face
-                            if shift == 0 and (image_position(box, x, code) - x).norm_sqr() < reach2:
-                                if n < limit:
-                                    entries[i * row + n * column] = i | (code << INDEX_BITS)
-                                n += 1
                             for k in range(first, last):
                                 j = entries[i * row + k * column] & INDEX_MASK
                                 if (image_position(box, position[j], code) - x).norm_sqr() < reach2:
@@ -259,7 +260,7 @@ def fill_lists(
 class TaichiNeighbours(Neighbours):
     """The same lists, found by Taichi; the kernels themselves look whether they are outdated."""
 
-    def _allocate_grid(self) -> None:
+    def _allocate_cells(self) -> None:
         size, device = self.pool.size, self.scene.device
         buckets = 1 << max(size - 1, 1).bit_length()
         self.key = wp.zeros(size, dtype=wp.int64, device=device)
@@ -286,15 +287,14 @@ class TaichiNeighbours(Neighbours):
                 self.scene.box,
                 self.reach,
                 self.limit,
-                self.row,
-                self.column,
+                self.lists.row,
+                self.lists.column,
                 pool.count,
                 pool.position,
                 *cells,
             ],
-            [self.entries, self.number, self.listed, pool.fault, self.outdated],
+            [self.entries, self.number, self.inside, self.listed, pool.fault, self.outdated],
         )
 
-    def footprint(self) -> dict[str, int]:
-        cells = sum(array.capacity for array in (self.key, self.start, self.filled, self.members))
-        return super().footprint() | {"neighbour cells": cells}
+    def _cell_arrays(self) -> list[wp.array]:
+        return [self.key, self.start, self.filled, self.members]

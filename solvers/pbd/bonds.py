@@ -16,7 +16,8 @@ from fluidbench.native.scene import PERIODIC, SLIP, STICK, Box, Phase, Scene, is
 
 from ..backends import Backend
 from ..bind import warp_func
-from ..neighbours import INDEX_BITS, INDEX_MASK, Lists, face_kind, image_code, image_position
+from ..images import INDEX_BITS, INDEX_MASK, face_kind, image_code, image_position
+from ..search import Lists, place_of
 from . import laws
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -145,13 +146,16 @@ def bind(
     """Bond fresh particles to all that are free around them; an older partner is told."""
     i = wp.tid()
     if i % capacity < count[i / capacity] and bonds.state[i] == FRESH:
-        for k in range(lists.number[i]):
-            entry = lists.entries[i * lists.row + k * lists.column]
+        g = i / lists.group
+        for k in range(lists.number[g]):
+            entry = lists.entries[place_of(lists, g, k)]
             j = entry & INDEX_MASK
             code = mirrors_only(box, entry >> INDEX_BITS)
-            if bonds.state[j] != LOOSE and code >= 0:
-                rest = wp.length(nearest_image(box, position[i] - image_position(box, position[j], code)))
-                if rest < REACH * spacing:
+            if bonds.state[j] != LOOSE and code >= 0 and entry != i:
+                # a list that others share may hold both a particle and its periodic image
+                near = wp.length(position[i] - image_position(box, position[j], entry >> INDEX_BITS))
+                if near < REACH * spacing:
+                    rest = wp.length(nearest_image(box, position[i] - image_position(box, position[j], code)))
                     add_bond(bonds, i, j | (code << INDEX_BITS), rest, fault)
                     if bonds.state[j] == BOUND:
                         add_bond(bonds, j, i | (code << INDEX_BITS), rest, fault)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.scene import PERIODIC, SLIP, STICK
 
-from ..neighbours import INDEX_BITS, INDEX_MASK
+from ..images import INDEX_BITS, INDEX_MASK
 from ..neighbours_taichi import BoxT, ListsT, digit, face_kind, image_position
 from ..taichi_bridge import Floats, Ints, Phases, Vectors, is_solid, phase_at, taichi_func, ti, vec3
 from . import laws
@@ -108,6 +108,7 @@ def bind(
     lists: ListsT,
     entries: Ints,
     listed: Ints,
+    inside: Ints,
     capacity: int,
     count: Ints,
     position: Vectors,
@@ -123,7 +124,7 @@ def bind(
             for k in range(listed[i]):
                 entry = entries[i * lists.row + k * lists.column]
                 j, code = entry & INDEX_MASK, holding(box, entry >> INDEX_BITS)
-                if state[j] != LOOSE and code >= 0:
+                if state[j] != LOOSE and code >= 0 and entry != i:
                     length = way_between(box, position[i], position[j], code).norm()
                     if length < REACH * spacing:
                         add_bond(i, j | (code << INDEX_BITS), length, number, partner, rest, fault)

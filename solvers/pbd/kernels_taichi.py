@@ -9,15 +9,25 @@ from fluidbench.native.scene import FRICTION, PERIODIC, STICK
 
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
 from ..flow_taichi import strained
-from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET
-from ..neighbours_taichi import BoxT, ListsT, contained, image_position, image_velocity
+from ..images import WALL_INSET
+from ..neighbours_taichi import BoxT, ListsT, contained, image_velocity
+from ..pairs_taichi import (
+    matrix_into,
+    over_pairs,
+    reader,
+    stressed,
+    symmetric_at,
+    vector_at,
+    vector_into,
+    writer,
+)
 from ..smoothing import poly6, spiky, spiky_slope
 from ..taichi_bridge import (
     Floats,
     Forces,
     Ints,
-    Matrices,
     Phases,
+    Quads,
     Vectors,
     beyond,
     force_at,
@@ -29,10 +39,11 @@ from ..taichi_bridge import (
     ti,
     too_fast,
     vec3,
+    vec4,
 )
 from . import laws
 from .bonds_taichi import bonded
-from .kernels_warp import FARTHEST, HURRIED, SLACK, SLACK_SOLID, Numbers
+from .kernels_warp import FARTHEST, HURRIED, MOVING, PLACE, PULLING, PUSH, SLACK, SLACK_SOLID, Numbers
 
 kernel = taichi_func(poly6)
 summed = taichi_func(spiky)
@@ -40,6 +51,8 @@ gradient = taichi_func(spiky_slope)
 smoothing_weight = taichi_func(laws.smoothing_weight, laws.largest_viscosity)
 conveyed_modulus = taichi_func(laws.conveyed_modulus, laws.largest_modulus)
 NumbersT = struct_of(Numbers)
+place_of, push_of, moving_of, pulling_of = (reader(n) for n in (PLACE, PUSH, MOVING, PULLING))
+write_pulling = writer(PULLING)
 
 
 @ti.func
@@ -53,24 +66,6 @@ def kept_inside(box, free, inset):
     return inside, back
 
 
-@ti.func
-def seen(box, position: ti.template(), entry):
-    """Where the neighbour of a list's entry is, as it is seen in the walls."""
-    x, code = position[entry & INDEX_MASK], entry >> INDEX_BITS
-    if code > 0:
-        x = image_position(box, x, code)
-    return x
-
-
-@ti.func
-def seen_moving(box, velocity: ti.template(), entry):
-    """The neighbour's velocity, likewise."""
-    v, code = velocity[entry & INDEX_MASK], entry >> INDEX_BITS
-    if code > 0:
-        v = image_velocity(box, v, code)
-    return v
-
-
 @ti.kernel
 def predict(
     num: NumbersT,
@@ -81,8 +76,10 @@ def predict(
     force: Forces,
     held: Ints,
     velocity: Vectors,
+    volume: Floats,
     position: Vectors,
     motion: Vectors,
+    places: Quads,
     fault: Ints,
 ):
     for i in range(position.shape[0]):
@@ -96,6 +93,24 @@ def predict(
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x, back = kept_inside(box, free, WALL_INSET * num.spacing)
             position[i], motion[i] = x, dt[world] * v + back
+            places[i] = vec4(x[0], x[1], x[2], volume[i])
+
+
+@ti.func
+def sharing(num, other, r):
+    """The gradient of the density that a neighbour brings, over its kernel's normalisation."""
+    return other[3] * gradient(r.norm(), num.support) / ti.max(r.norm(), 1.0e-9) * r
+
+
+@ti.func
+def multiplier_pair(num, own, begun, other, r):
+    g = num.weight * sharing(num, other, r)
+    sums = ti.Vector.zero(ti.f32, 5)
+    sums[0], sums[4] = other[3] * summed(r.norm(), num.support), g.norm_sqr()
+    return vector_into(sums, 1, g)
+
+
+constrained_by = over_pairs(PLACE, 5, multiplier_pair)
 
 
 @ti.kernel
@@ -105,33 +120,36 @@ def multipliers(
     lists: ListsT,
     entries: Ints,
     number: Ints,
+    inside: Ints,
     capacity: int,
     count: Ints,
+    places: Quads,
     phases: Phases,
     phase_of: Ints,
-    position: Vectors,
-    volume: Floats,
-    multiplier: Floats,
+    held: Ints,
+    pushes: Quads,
     fill: Floats,
+    correction: Vectors,
 ):
-    for i in range(position.shape[0]):
+    for i in range(held.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
-            dense = 0.5 * (volume[i] + num.spacing**3) * summed(0.0, num.support)
-            total, squares = vec3(0.0), 0.0
-            for k in range(number[i]):
-                entry = entries[i * lists.row + k * lists.column]
-                share = volume[entry & INDEX_MASK]
-                r = position[i] - seen(box, position, entry)
-                distance = r.norm()
-                dense += share * summed(distance, num.support)
-                g = share * num.weight * gradient(distance, num.support) / ti.max(distance, 1.0e-9) * r
-                total += g
-                squares += g.norm_sqr()
-            fill[i] = num.weight * dense
+            own = place_of(places, i)
+            sums = constrained_by(num, box, lists, entries, number, places, held, i, own, vec4(0.0))
+            dense = num.weight * (sums[0] + 0.5 * (own[3] + num.spacing**3) * summed(0.0, num.support))
+            fill[i] = dense
             limit = 1.0 + (SLACK_SOLID if bonded(phase_at(phases, world, phase_of[i])) else SLACK)
-            metric = (squares + total.norm_sqr()) * num.spacing * num.spacing
-            multiplier[i] = -ti.max(num.weight * dense - limit, 0.0) / (metric + num.relaxation)
+            metric = (sums[4] + vector_at(sums, 1).norm_sqr()) * num.spacing * num.spacing
+            pushes[2 * i] = places[i]
+            pushes[2 * i + 1] = vec4(-ti.max(dense - limit, 0.0) / (metric + num.relaxation), 0.0, 0.0, 0.0)
+
+
+@ti.func
+def correct_pair(num, own, begun, other, r):
+    return (own[4] + other[4]) * num.weight * sharing(num, other, r)
+
+
+corrected_by = over_pairs(PUSH, 3, correct_pair)
 
 
 @ti.kernel
@@ -141,23 +159,21 @@ def correct(
     lists: ListsT,
     entries: Ints,
     number: Ints,
+    inside: Ints,
     capacity: int,
     count: Ints,
+    pushes: Quads,
+    phases: Phases,
+    phase_of: Ints,
     held: Ints,
-    position: Vectors,
-    volume: Floats,
-    multiplier: Floats,
+    pushed: Quads,
+    fill: Floats,
     correction: Vectors,
 ):
-    for i in range(position.shape[0]):
+    for i in range(held.shape[0]):
         if i % capacity < count[i // capacity] and held[i] == FREE:
-            shift = vec3(0.0)
-            for k in range(number[i]):
-                entry = entries[i * lists.row + k * lists.column]
-                j = entry & INDEX_MASK
-                r = position[i] - seen(box, position, entry)
-                g = volume[j] * num.weight * gradient(r.norm(), num.support) / ti.max(r.norm(), 1.0e-9)
-                shift += (multiplier[i] + multiplier[j]) * g * r
+            own = push_of(pushes, i)
+            shift = corrected_by(num, box, lists, entries, number, pushes, held, i, own, vec4(0.0))
             correction[i] = num.over_relaxation * num.spacing * num.spacing * shift
 
 
@@ -169,8 +185,10 @@ def apply(
     count: Ints,
     held: Ints,
     correction: Vectors,
+    volume: Floats,
     position: Vectors,
     motion: Vectors,
+    places: Quads,
     fault: Ints,
 ):
     for i in range(position.shape[0]):
@@ -186,6 +204,7 @@ def apply(
             x, back = kept_inside(box, free, WALL_INSET * num.spacing)
             position[i] = x
             motion[i] += shift + back
+            places[i] = vec4(x[0], x[1], x[2], volume[i])
 
 
 @ti.kernel
@@ -197,50 +216,100 @@ def velocities(capacity: int, count: Ints, dt: Floats, held: Ints, motion: Vecto
 
 
 @ti.kernel
+def pack(capacity: int, count: Ints, position: Vectors, volume: Floats, velocity: Vectors, moving: Quads):
+    for i in range(position.shape[0]):
+        if i % capacity < count[i // capacity]:
+            x, v = position[i], velocity[i]
+            moving[2 * i] = vec4(x[0], x[1], x[2], volume[i])
+            moving[2 * i + 1] = vec4(v[0], v[1], v[2], 0.0)
+
+
+@ti.kernel
+def settle(capacity: int, count: Ints, smoothed: Vectors, velocity: Vectors, moving: Quads):
+    for i in range(velocity.shape[0]):
+        if i % capacity < count[i // capacity]:
+            v = smoothed[i]
+            velocity[i] = v
+            moving[2 * i + 1] = vec4(v[0], v[1], v[2], 0.0)
+
+
+@ti.func
+def moving_seen(box, extra: ti.template(), row, j, code):
+    return vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
+
+
+@ti.func
+def pulling_seen(box, extra: ti.template(), row, j, code):
+    moved = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
+    return matrix_into(moved, 7, mirrored_stress(box, stressed(row, 7), code))
+
+
+@ti.func
+def strain_pair(num, own, begun, other, r):
+    g = sharing(num, other, r)
+    square = -g.outer_product(r)
+    sums = matrix_into(ti.Vector.zero(ti.f32, 15), 0, -(vector_at(own, 4) - vector_at(other, 4)).outer_product(g))
+    sums = vector_into(sums, 9, vec3(square[0, 0], square[1, 1], square[2, 2]))
+    return vector_into(sums, 12, vec3(square[0, 1], square[0, 2], square[1, 2]))
+
+
+strained_by = over_pairs(MOVING, 15, strain_pair, moving_seen)
+
+
+@ti.kernel
 def strain(
     num: NumbersT,
     box: BoxT,
     lists: ListsT,
     entries: Ints,
     number: Ints,
+    inside: Ints,
     capacity: int,
     count: Ints,
+    rows: Quads,
     dt: Floats,
     phases: Phases,
     phase_of: Ints,
     held: Ints,
-    position: Vectors,
     mass: Floats,
     volume: Floats,
-    velocity: Vectors,
     elastic_normal: Vectors,
     elastic_shear: Vectors,
-    stress: Matrices,
+    pulling: Quads,
+    smoothed: Vectors,
 ):
-    for i in range(position.shape[0]):
+    for i in range(held.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
             phase = phase_at(phases, world, phase_of[i])
+            own = moving_of(rows, i)
             carried = mat3(0.0)
             if not bonded(phase):
-                l, moment = mat3(0.0), mat3(0.0)
-                for k in range(number[i]):
-                    entry = entries[i * lists.row + k * lists.column]
-                    r = position[i] - seen(box, position, entry)
-                    u = velocity[i] - seen_moving(box, velocity, entry)
-                    g = volume[entry & INDEX_MASK] * gradient(r.norm(), num.support) / ti.max(r.norm(), 1.0e-9)
-                    l -= g * u.outer_product(r)
-                    moment -= g * r.outer_product(r)
-                correction = symmetric_inverse(moment)
-                l = l @ correction
+                sums = strained_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+                correction = symmetric_inverse(symmetric_at(sums, 9))
                 rest = rest_density(mass, volume, i)
                 modulus = conveyed_modulus(phase.shear_modulus, num.stiffness, rest, num.spacing, dt[world])
                 b, s = elastic_normal[i], elastic_shear[i]
                 if held[i] != CARRIED:
-                    b, s = strained(phase, modulus, l, b, s, dt[world])
+                    b, s = strained(phase, modulus, stressed(sums, 0) @ correction, b, s, dt[world])
                     elastic_normal[i], elastic_shear[i] = b, s
                 carried = elastic_stress(modulus, b, s, 0.0) @ correction
-            stress[i] = carried
+            row = ti.Vector.zero(ti.f32, PULLING)
+            for c in ti.static(range(7)):
+                row[c] = own[c]
+            write_pulling(pulling, i, matrix_into(row, 7, carried))
+
+
+@ti.func
+def pull_pair(num, own, begun, other, r):
+    a = (stressed(own, 7) + stressed(other, 7)) @ sharing(num, other, r)
+    u = vector_at(own, 4) - vector_at(other, 4)
+    w = other[3] * num.weight * kernel(r.norm_sqr(), num.support)
+    damping = -w * u.dot(r) / ti.max(r.norm_sqr(), 1.0e-18) * r
+    return vector_into(vector_into(ti.Vector.zero(ti.f32, 6), 0, a), 3, damping)
+
+
+pulled_by = over_pairs(PULLING, 6, pull_pair, pulling_seen)
 
 
 @ti.kernel
@@ -250,37 +319,40 @@ def pull(
     lists: ListsT,
     entries: Ints,
     number: Ints,
+    inside: Ints,
     capacity: int,
     count: Ints,
+    rows: Quads,
     dt: Floats,
+    phases: Phases,
+    phase_of: Ints,
     held: Ints,
-    position: Vectors,
     mass: Floats,
     volume: Floats,
-    stress: Matrices,
-    velocity: Vectors,
+    elastic_normal: Vectors,
+    elastic_shear: Vectors,
+    pulling: Quads,
     smoothed: Vectors,
 ):
-    for i in range(position.shape[0]):
+    for i in range(held.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
-            v = velocity[i]
-            a, damping = vec3(0.0), vec3(0.0)
-            for k in range(number[i]):
-                entry = entries[i * lists.row + k * lists.column]
-                j, code = entry & INDEX_MASK, entry >> INDEX_BITS
-                other = stress[j]
-                if code > 0:
-                    other = mirrored_stress(box, other, code)
-                r = position[i] - seen(box, position, entry)
-                u = v - seen_moving(box, velocity, entry)
-                g = volume[j] * gradient(r.norm(), num.support) / ti.max(r.norm(), 1.0e-9)
-                a += g * ((stress[i] + other) @ r)
-                w = volume[j] * num.weight * kernel(r.norm_sqr(), num.support)
-                damping -= w * u.dot(r) / ti.max(r.norm_sqr(), 1.0e-18) * r
+            own = pulling_of(rows, i)
+            v = vector_at(own, 4)
             if held[i] == FREE:
-                v += dt[world] / rest_density(mass, volume, i) * a + num.calm * damping
+                sums = pulled_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+                v += dt[world] / rest_density(mass, volume, i) * vector_at(sums, 0) + num.calm * vector_at(sums, 3)
             smoothed[i] = v
+
+
+@ti.func
+def shear_pair(num, own, begun, other, r):
+    w = other[3] * num.weight * kernel(r.norm_sqr(), num.support)
+    difference = w * (vector_at(other, 4) - vector_at(own, 4))
+    return vec4(difference[0], difference[1], difference[2], w)
+
+
+sheared_by = over_pairs(MOVING, 4, shear_pair, moving_seen)
 
 
 @ti.kernel
@@ -290,34 +362,33 @@ def shear(
     lists: ListsT,
     entries: Ints,
     number: Ints,
+    inside: Ints,
     capacity: int,
     count: Ints,
+    rows: Quads,
     dt: Floats,
     phases: Phases,
     phase_of: Ints,
     held: Ints,
-    position: Vectors,
     mass: Floats,
     volume: Floats,
-    velocity: Vectors,
+    elastic_normal: Vectors,
+    elastic_shear: Vectors,
+    pulling: Quads,
     smoothed: Vectors,
 ):
-    for i in range(position.shape[0]):
+    for i in range(held.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
-            v = velocity[i]
+            own = moving_of(rows, i)
+            v = vector_at(own, 4)
             if held[i] == FREE:
-                difference, total = vec3(0.0), volume[i] * num.weight * kernel(0.0, num.support)
-                for k in range(number[i]):
-                    entry = entries[i * lists.row + k * lists.column]
-                    r2 = (position[i] - seen(box, position, entry)).norm_sqr()
-                    w = volume[entry & INDEX_MASK] * num.weight * kernel(r2, num.support)
-                    difference += w * (seen_moving(box, velocity, entry) - v)
-                    total += w
+                sums = sheared_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+                total = sums[3] + own[3] * num.weight * kernel(0.0, num.support)
                 viscosity = phase_at(phases, world, phase_of[i]).viscosity
                 rest = rest_density(mass, volume, i)
                 c = smoothing_weight(viscosity, rest, dt[world], num.support, ti.cast(num.sweeps, ti.f32))
-                v += c / ti.max(total, 1.0) * difference
+                v += c / ti.max(total, 1.0) * vector_at(sums, 0)
             smoothed[i] = v
 
 
@@ -372,6 +443,8 @@ PASSES = SimpleNamespace(
     correct=correct,
     apply=apply,
     velocities=velocities,
+    pack=pack,
+    settle=settle,
     strain=strain,
     pull=pull,
     shear=shear,

@@ -20,9 +20,10 @@ from fluidbench.scenario import Scenario
 from .. import aging
 from ..backends import backend_of
 from ..constitutive import STRETCHED
-from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
-from ..order import CellOrder
+from ..neighbours import crowded, neighbours_of, side_by_side
+from ..pairs import BLOCK
 from ..readout import present_density
+from ..search import FAULT_NEIGHBOURS
 from ..smoothing import spiky
 from . import bonds, laws
 from . import kernels_warp as kernels
@@ -74,9 +75,11 @@ class SolverPBD(Solver):
         "correct",
         "apply",
         "velocities",
+        "pack",
         "strain",
         "pull",
         "shear",
+        "settle",
         "wall_friction",
     )
 
@@ -165,21 +168,38 @@ class SolverPBD(Solver):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)
             self.smoothed = wp.zeros(pool.size, dtype=wp.vec3)
-            self.multiplier = wp.zeros(pool.size, dtype=float)
             self.fill = wp.ones(pool.size, dtype=float)
-            self.stress = wp.zeros(pool.size if scene.flowing else 1, dtype=wp.mat33)
+            self.places = wp.zeros(pool.size * kernels.PLACE // 4, dtype=wp.vec4)
+            self.pushes = wp.zeros(pool.size * kernels.PUSH // 4, dtype=wp.vec4)
+            sheared, pulled = scene.flowing or scene.viscous, scene.flowing
+            self.moving = wp.zeros(pool.size * kernels.MOVING // 4 if sheared else 1, dtype=wp.vec4)
+            self.pulling = wp.zeros(pool.size * kernels.PULLING // 4 if pulled else 1, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, config.skin * scene.spacing)
-        self.pairs = self.neighbours.lists
-        self.order = CellOrder(scene, pool, self.num.support)
+        self._bring_together()
+        self.order = side_by_side(scene, pool)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, those of bonds where the scene has any."""
-        fluid, solid = kernels.PASSES, bonds.PASSES
         if backend == "taichi":
             from . import bonds_taichi, kernels_taichi
 
             fluid, solid = kernels_taichi.PASSES, bonds_taichi.PASSES
+        else:
+            fluid, solid = kernels.passes(self.scene.device.is_cpu), bonds.PASSES
         return SimpleNamespace(**vars(fluid), **(vars(solid) if bonds.needed(self.scene) else {}))
+
+    def _bring_together(self) -> None:
+        """What the passes over pairs read and write, as they take it."""
+        pool, scene = self.pool, self.scene
+        self.constraining, self.shearing = kernels.Constraining(), kernels.Shearing()
+        for data in (self.constraining, self.shearing):
+            data.phases, data.phase_of, data.held = scene.phases, pool.phase, pool.held
+        self.constraining.pushes, self.constraining.fill = self.pushes, self.fill
+        self.constraining.correction = self.correction
+        elastic = [pool.elastic_normal, pool.elastic_shear] if scene.flowing else [self.motion, self.motion]
+        self.shearing.elastic_normal, self.shearing.elastic_shear = elastic
+        self.shearing.dt, self.shearing.mass, self.shearing.volume = scene.dt, pool.mass, pool.volume
+        self.shearing.pulling, self.shearing.smoothed = self.pulling, self.smoothed
 
     def refresh(self) -> None:
         self.neighbours.refresh()
@@ -201,12 +221,16 @@ class SolverPBD(Solver):
             self.correct()
             self.apply()
         self.velocities()
+        if self.scene.flowing or self.scene.viscous:
+            self.pack()
         if self.scene.flowing:
             self.strain()
             self.pull()
+            self.settle()
         if self.scene.viscous:
             for _ in range(self.config.shear_sweeps):
                 self.shear()
+                self.settle()
         if self.wall_friction_acts:
             self.wall_friction()
 
@@ -242,8 +266,8 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         self._launch(
             self.kernels.predict,
-            [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held, pool.velocity],
-            [pool.position, self.motion, pool.fault],
+            [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held, pool.velocity, pool.volume],
+            [pool.position, self.motion, self.places, pool.fault],
         )
 
     def lists(self) -> None:
@@ -251,43 +275,29 @@ class SolverPBD(Solver):
 
     def bind(self) -> None:
         assert self.network is not None
-        self.network.bind(self.pairs)
+        self.network.bind(self.neighbours.lists)
 
     def stretch(self, sweep: int = 0) -> None:
         assert self.network is not None
         self.network.stretch(sweep, self.correction)
 
+    def _over_pairs(self, kernel: Any, rows: wp.array, data: Any) -> None:
+        lists = self.neighbours
+        common = [self.num, self.scene.box, lists.lists, *self._active()]
+        self.backend.launch(kernel, lists.work, [*common, rows, data], block_dim=BLOCK)
+
     def multipliers(self) -> None:
-        pool, scene = self.pool, self.scene
-        self._launch(
-            self.kernels.multipliers,
-            [self.num, scene.box, self.pairs, *self._active(), scene.phases, pool.phase, pool.position, pool.volume],
-            [self.multiplier, self.fill],
-        )
+        self._over_pairs(self.kernels.multipliers, self.places, self.constraining)
 
     def correct(self) -> None:
-        pool = self.pool
-        self._launch(
-            self.kernels.correct,
-            [
-                self.num,
-                self.scene.box,
-                self.pairs,
-                *self._active(),
-                pool.held,
-                pool.position,
-                pool.volume,
-                self.multiplier,
-            ],
-            [self.correction],
-        )
+        self._over_pairs(self.kernels.correct, self.pushes, self.constraining)
 
     def apply(self) -> None:
         pool = self.pool
         self._launch(
             self.kernels.apply,
-            [self.num, self.scene.box, *self._active(), pool.held, self.correction],
-            [pool.position, self.motion, pool.fault],
+            [self.num, self.scene.box, *self._active(), pool.held, self.correction, pool.volume],
+            [pool.position, self.motion, self.places, pool.fault],
         )
 
     def velocities(self) -> None:
@@ -298,69 +308,21 @@ class SolverPBD(Solver):
             [pool.velocity],
         )
 
+    def pack(self) -> None:
+        pool = self.pool
+        self._launch(self.kernels.pack, [*self._active(), pool.position, pool.volume, pool.velocity], [self.moving])
+
     def strain(self) -> None:
-        pool, scene = self.pool, self.scene
-        self._launch(
-            self.kernels.strain,
-            [
-                self.num,
-                scene.box,
-                self.pairs,
-                *self._active(),
-                scene.dt,
-                scene.phases,
-                pool.phase,
-                pool.held,
-                pool.position,
-                pool.mass,
-                pool.volume,
-                pool.velocity,
-            ],
-            [pool.elastic_normal, pool.elastic_shear, self.stress],
-        )
+        self._over_pairs(self.kernels.strain, self.moving, self.shearing)
 
     def pull(self) -> None:
-        pool, scene = self.pool, self.scene
-        self._launch(
-            self.kernels.pull,
-            [
-                self.num,
-                scene.box,
-                self.pairs,
-                *self._active(),
-                scene.dt,
-                pool.held,
-                pool.position,
-                pool.mass,
-                pool.volume,
-                self.stress,
-                pool.velocity,
-            ],
-            [self.smoothed],
-        )
-        wp.copy(pool.velocity, self.smoothed)
+        self._over_pairs(self.kernels.pull, self.pulling, self.shearing)
 
     def shear(self) -> None:
-        pool, scene = self.pool, self.scene
-        self._launch(
-            self.kernels.shear,
-            [
-                self.num,
-                scene.box,
-                self.pairs,
-                *self._active(),
-                scene.dt,
-                scene.phases,
-                pool.phase,
-                pool.held,
-                pool.position,
-                pool.mass,
-                pool.volume,
-                pool.velocity,
-            ],
-            [self.smoothed],
-        )
-        wp.copy(pool.velocity, self.smoothed)
+        self._over_pairs(self.kernels.shear, self.moving, self.shearing)
+
+    def settle(self) -> None:
+        self._launch(self.kernels.settle, [*self._active(), self.smoothed], [self.pool.velocity, self.moving])
 
     def wall_friction(self) -> None:
         pool, scene = self.pool, self.scene
@@ -397,7 +359,7 @@ class SolverPBD(Solver):
         return present_density(self.pool, 1.0 / np.maximum(self.fill.numpy(), 1.0))
 
     def footprint(self) -> dict[str, int]:
-        own = ("motion", "correction", "smoothed", "multiplier", "fill", "stress")
+        own = ("motion", "correction", "smoothed", "fill", "places", "pushes", "moving", "pulling")
         bytes_of = {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
         return bytes_of | (self.network.footprint() if self.network else {})
 

@@ -6,21 +6,22 @@ from types import SimpleNamespace
 
 from fluidbench.method.frame import CARRIED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
-from fluidbench.native.scene import FRICTION, PERIODIC
+from fluidbench.native.scene import PERIODIC
 
 from ..aging import DISORDER
 from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
 from ..flow_taichi import pressure, strained
-from ..neighbours import INDEX_BITS, INDEX_MASK, WALL_INSET
-from ..neighbours_taichi import (
-    BoxT,
-    ListsT,
-    contained,
-    face_kind,
-    image_gradient,
-    image_position,
-    image_rate,
-    image_velocity,
+from ..images import WALL_INSET
+from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_rate, image_velocity
+from ..pairs_taichi import (
+    matrix_into,
+    over_pairs,
+    reader,
+    stressed,
+    symmetric_at,
+    vector_at,
+    vector_into,
+    writer,
 )
 from ..smoothing import wendland, wendland_slope
 from ..taichi_bridge import (
@@ -29,6 +30,7 @@ from ..taichi_bridge import (
     Ints,
     Matrices,
     Phases,
+    Quads,
     Vectors,
     beyond,
     force_at,
@@ -41,12 +43,34 @@ from ..taichi_bridge import (
     ti,
     too_fast,
     vec3,
+    vec4,
 )
-from .kernels_warp import CRUSHED, FLOOR, WHOLE, Smoothing
+from .kernels_warp import CRUSHED, FLOOR, MATTER, STATE, WHOLE, Smoothing
 
 kernel = taichi_func(wendland)
 slope = taichi_func(wendland_slope)
 SmoothingT = struct_of(Smoothing)
+matter_at = reader(MATTER)
+
+
+@ti.kernel
+def pack(
+    capacity: int,
+    count: Ints,
+    position: Vectors,
+    velocity: Vectors,
+    mass: Floats,
+    volume: Floats,
+    density: Floats,
+    carried_gradient: Vectors,
+    matter: Quads,
+):
+    for i in range(position.shape[0]):
+        if i % capacity < count[i // capacity]:
+            x, v, g = position[i], velocity[i], carried_gradient[i]
+            matter[3 * i] = vec4(x[0], x[1], x[2], mass[i])
+            matter[3 * i + 1] = vec4(v[0], v[1], v[2], density[i])
+            matter[3 * i + 2] = vec4(g[0], g[1], g[2], rest_density(mass, volume, i))
 
 
 @ti.kernel
@@ -111,10 +135,41 @@ def rubbed(box, x, v, inward_pull, walls, h):
     return gained
 
 
+@ti.func
+def matter_seen(box, extra: ti.template(), row, j, code):
+    """A row of `strain` in the walls."""
+    moved = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
+    return vector_into(moved, 8, image_gradient(box, vector_at(row, 8), code))
+
+
 @functools.cache
 def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
     """All passes, for materials with or without shear stiffness, viscosity, and parameters or rest densities that
     differ between particles."""
+    width = STATE[strength, changing]
+    last, many = width - 4, 19 if strength else 6
+    state_at, write_state = reader(width), writer(width)
+
+    @ti.func
+    def strain_pair(num, own, begun, other, r):
+        u = vector_at(own, 4) - vector_at(other, 4)
+        w, partner, partner_gradient = other[3] * slope(r.norm() / num.h, num.h), other[7], vector_at(other, 8)
+        if ti.static(changing):  # in volumes and compressions
+            relative = own[11] / other[11]
+            w, partner, partner_gradient = w * relative, partner * relative, partner_gradient * relative
+        sums = ti.Vector.zero(ti.f32, many)
+        sums[0] = w * (own[7] - partner - (vector_at(own, 8) + partner_gradient).dot(r))
+        sums = vector_into(sums, 1, w * r)
+        if ti.static(strength):
+            sums = matrix_into(sums, 4, -w * u.outer_product(r))
+            square = -w * r.outer_product(r)
+            sums = vector_into(sums, 13, vec3(square[0, 0], square[1, 1], square[2, 2]))
+            sums = vector_into(sums, 16, vec3(square[0, 1], square[0, 2], square[1, 2]))
+        else:
+            sums[4], sums[5] = -w * r.norm_sqr(), w * u.dot(r)
+        return sums
+
+    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen)
 
     @ti.kernel
     def strain(
@@ -123,62 +178,43 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         lists: ListsT,
         entries: Ints,
         number: Ints,
+        inside: Ints,
         capacity: int,
         count: Ints,
+        matter: Quads,
         dt: Floats,
         phases: Phases,
         phase_of: Ints,
         held: Ints,
-        position: Vectors,
-        velocity: Vectors,
-        mass: Floats,
-        volume: Floats,
-        density: Floats,
-        carried_gradient: Vectors,
         elastic_normal: Vectors,
         elastic_shear: Vectors,
         new_density: Floats,
-        pressure_term: Floats,
-        stress: Matrices,
+        state: Quads,
         rate: Matrices,
         fault: Ints,
     ):
-        for i in range(position.shape[0]):
+        for i in range(held.shape[0]):
             world = i // capacity
             if i - world * capacity < count[world]:
                 phase = phase_at(phases, world, phase_of[i])
-                rho, rest, sound = density[i], phase.density, phase.wave_speed
+                own = matter_at(matter, i)
+                rho, rest, sound = own[7], phase.density, phase.wave_speed
                 if ti.static(changing):
-                    rest = rest_density(mass, volume, i)
+                    rest = own[11]
                     sound *= ti.sqrt(phase.density / rest)
-                approach, spread, second = 0.0, 0.0, 0.0
-                first_moment = vec3(0.0)
-                gradient, moment = mat3(0.0), mat3(0.0)
-                for k in range(number[i]):
-                    entry = entries[i * lists.row + k * lists.column]
-                    j, code = entry & INDEX_MASK, entry >> INDEX_BITS
-                    xj, vj, partner_gradient = position[j], velocity[j], carried_gradient[j]
-                    if code > 0:
-                        xj, vj = image_position(box, xj, code), image_velocity(box, vj, code)
-                        partner_gradient = image_gradient(box, partner_gradient, code)
-                    r, u = position[i] - xj, velocity[i] - vj
-                    w, partner = mass[j] * slope(r.norm() / num.h, num.h), density[j]
-                    if ti.static(changing):  # in volumes and compressions
-                        relative = rest / rest_density(mass, volume, j)
-                        w, partner, partner_gradient = w * relative, partner * relative, partner_gradient * relative
-                    approach += w * u.dot(r)
-                    spread += w * (rho - partner - (carried_gradient[i] + partner_gradient).dot(r))
-                    second -= w * r.norm_sqr()
-                    first_moment += w * r
-                    if ti.static(strength):
-                        gradient -= w * u.outer_product(r)
-                        moment -= w * r.outer_product(r)
-                correction = ti.Matrix.identity(ti.f32, 3)
+                sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
+                spread, first_moment = sums[0], vector_at(sums, 1)
+                second, approach = 0.0, 0.0
+                gradient, correction = mat3(0.0), ti.Matrix.identity(ti.f32, 3)
                 if ti.static(strength):
+                    moment = symmetric_at(sums, 13)
+                    second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
-                    gradient = gradient @ correction / rho
+                    gradient = stressed(sums, 4) @ correction / rho
                     rate[i] = gradient
                     approach = -rho * gradient.trace()
+                else:
+                    second, approach = sums[4], sums[5]
                 # What is summed against what is integrated, where the neighbourhood is whole or too crowded.
                 drift = second * num.lattice / 3.0 - rho
                 whole = 1.0
@@ -206,15 +242,70 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 scale = 1.0
                 if ti.static(not changing):
                     scale = 1.0 / (rho * rho)
+                row = ti.Vector.zero(ti.f32, width)
+                for c in ti.static(range(7)):
+                    row[c] = own[c]
                 if ti.static(strength):
                     b, s = elastic_normal[i], elastic_shear[i]
                     if held[i] != CARRIED:
                         b, s = strained(phase, phase.shear_modulus, gradient, b, s, h)
                         elastic_normal[i], elastic_shear[i] = b, s
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
-                    stress[i] = scale * (cauchy @ correction)
+                    row = matrix_into(row, 7, scale * (cauchy @ correction))
+                    d = 0.5 * (gradient + gradient.transpose())
+                    row = vector_into(row, 16, vec3(d[0, 0], d[1, 1], d[2, 2]))
+                    row = vector_into(row, 19, vec3(d[0, 1], d[0, 2], d[1, 2]))
                 else:
-                    pressure_term[i] = scale * p
+                    row[7] = scale * p
+                if ti.static(changing):
+                    row = vector_into(row, last, vec3(rho, rest, phase.viscosity))
+                    row[last + 3] = sound
+                write_state(state, i, row)
+
+    @ti.func
+    def state_seen(box, rate: ti.template(), row, j, code):
+        out = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
+        if ti.static(strength):
+            out = matrix_into(out, 7, mirrored_stress(box, stressed(row, 7), code))
+            flow = image_rate(box, rate[j], code)
+            d = 0.5 * (flow + flow.transpose())
+            out = vector_into(out, 16, vec3(d[0, 0], d[1, 1], d[2, 2]))
+            out = vector_into(out, 19, vec3(d[0, 1], d[0, 2], d[1, 2]))
+        return out
+
+    @ti.func
+    def force_pair(num, own, begun, other, r):
+        u = vector_at(own, 4) - vector_at(other, 4)
+        r2, ur, tiny = r.norm_sqr(), u.dot(r), 0.01 * num.h * num.h
+        q = ti.sqrt(r2) / num.h
+        shock, drag = begun[0], begun[1]
+        if ti.static(changing):
+            # means of both partners, for both must find the same force
+            fast = 0.5 * (own[last + 3] + other[last + 3])
+            shock = num.artificial_viscosity * num.h * fast / ti.max(own[last], other[last])
+            thin = 2.0 * own[last + 2] * other[last + 2] / ti.max(own[last + 2] + other[last + 2], 1.0e-30)
+            drag = 10.0 * num.viscous_lattice * thin / (own[last + 1] * other[last + 1])
+        along = 0.0  # what acts along the line of centres
+        push = vec3(0.0)
+        if ti.static(strength):
+            flow = symmetric_at(own, 16) + symmetric_at(other, 16)
+            along = shock * (ur - 0.5 * r.dot(flow @ r)) / (r2 + tiny)
+            both = stressed(own, 7) + stressed(other, 7)
+            if ti.static(changing):
+                both /= own[last] * other[last]
+            push = both @ r
+            tension = ti.max(both.trace() / 3.0, 0.0)
+            along -= num.artificial_stress * tension * (kernel(q, num.h) / num.peak) ** 4
+        else:
+            pressures = own[7] + other[7]
+            if ti.static(changing):
+                pressures /= own[last] * other[last]
+            along = shock * ti.min(ur, 0.0) / (r2 + tiny) - pressures
+        if ti.static(viscous):
+            along += drag * ur / (r2 + 0.01 * tiny)
+        return vector_into(ti.Vector.zero(ti.f32, 6), 0, other[3] * slope(q, num.h) * (push + along * r))
+
+    pushed_by = over_pairs(width, 6, force_pair, state_seen, rough=True)
 
     @ti.kernel
     def force(
@@ -223,83 +314,30 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         lists: ListsT,
         entries: Ints,
         number: Ints,
+        inside: Ints,
         capacity: int,
         count: Ints,
+        state: Quads,
         dt: Floats,
         phases: Phases,
         phase_of: Ints,
         forces: Forces,
-        position: Vectors,
-        velocity: Vectors,
-        mass: Floats,
-        volume: Floats,
         density: Floats,
-        pressure_term: Floats,
-        stress: Matrices,
         rate: Matrices,
         acceleration: Vectors,
     ):
-        for i in range(position.shape[0]):
+        for i in range(phase_of.shape[0]):
             world = i // capacity
             if i - world * capacity < count[world]:
                 phase = phase_at(phases, world, phase_of[i])
-                x, v, rho = position[i], velocity[i], density[i]
-                tiny = 0.01 * num.h * num.h
+                own = state_at(state, i)
                 # Pi_ij per velocity difference: alpha h c / rho (Monaghan 1992), and 2 (d + 2) mu / (rho_i rho_j)
-                shock = num.artificial_viscosity * num.h * phase.wave_speed / rho
+                shock = num.artificial_viscosity * num.h * phase.wave_speed / density[i]
                 drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
-                rest, sound = phase.density, phase.wave_speed
-                if ti.static(changing):
-                    rest = rest_density(mass, volume, i)
-                    sound *= ti.sqrt(phase.density / rest)
-                lattice = kernel(num.spacing / num.h, num.h)
-                pull = force_at(forces, world, x)
-                a, walls = vec3(0.0), vec3(0.0)
-                for k in range(number[i]):
-                    entry = entries[i * lists.row + k * lists.column]
-                    j, code = entry & INDEX_MASK, entry >> INDEX_BITS
-                    xj, vj = position[j], velocity[j]
-                    if code > 0:
-                        xj, vj = image_position(box, xj, code), image_velocity(box, vj, code)
-                    r, u = x - xj, v - vj
-                    r2, ur = r.norm_sqr(), u.dot(r)
-                    q = ti.sqrt(r2) / num.h
-                    if ti.static(changing):
-                        # means of both partners, for both must find the same force
-                        partner = phase_at(phases, world, phase_of[j])
-                        other_rest = rest_density(mass, volume, j)
-                        fast = 0.5 * (sound + partner.wave_speed * ti.sqrt(partner.density / other_rest))
-                        shock = num.artificial_viscosity * num.h * fast / ti.max(rho, density[j])
-                        total = ti.max(phase.viscosity + partner.viscosity, 1.0e-30)
-                        thin = 2.0 * phase.viscosity * partner.viscosity / total
-                        drag = 10.0 * num.viscous_lattice * thin / (rest * other_rest)
-                    along = 0.0  # what acts along the line of centres
-                    push = vec3(0.0)
-                    if ti.static(strength):
-                        flow, other = rate[j], stress[j]
-                        if code > 0:
-                            flow, other = image_rate(box, flow, code), mirrored_stress(box, other, code)
-                        along = shock * (ur - 0.5 * r.dot((rate[i] + flow) @ r)) / (r2 + tiny)
-                        other += stress[i]
-                        if ti.static(changing):
-                            other /= rho * density[j]
-                        push = other @ r
-                        tension = other.trace() / 3.0
-                        if tension > 0.0:
-                            along -= num.artificial_stress * tension * (kernel(q, num.h) / lattice) ** 4
-                    else:
-                        both = pressure_term[i] + pressure_term[j]
-                        if ti.static(changing):
-                            both /= rho * density[j]
-                        along = shock * ti.min(ur, 0.0) / (r2 + tiny) - both
-                    if ti.static(viscous):
-                        along += drag * ur / (r2 + 0.01 * tiny)
-                    push = mass[j] * slope(q, num.h) * (push + along * r)
-                    for axis in ti.static(range(3)):
-                        if code > 0 and face_kind(box, code, axis) == FRICTION:
-                            walls[axis] += push[axis]
-                            push[axis] = 0.0
-                    a += push
-                acceleration[i] = a + pull + rubbed(box, x, v, a + pull, walls, dt[world])
+                begun = vec4(shock, drag, 0.0, 0.0)
+                sums = pushed_by(num, box, lists, entries, number, state, rate, i, own, begun)
+                a = vector_at(sums, 0) + force_at(forces, world, vector_at(own, 0))
+                rub = rubbed(box, vector_at(own, 0), vector_at(own, 4), a, vector_at(sums, 3), dt[world])
+                acceleration[i] = a + rub
 
-    return SimpleNamespace(strain=strain, force=force, move=move)
+    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move)

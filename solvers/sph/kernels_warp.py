@@ -1,8 +1,8 @@
 """Weakly compressible SPH in Warp: continuity density, delta-SPH diffusion, the common material law.
 
-One substep: lists, strain (continuity, velocity gradient, stress), force (momentum), move. Materials with shear
-stiffness use corrected gradients for strain and stress (see corrected.py), liquids the symmetric form of Monaghan
-(2005, Rep. Prog. Phys. 68:1703).
+One substep: lists, pack (rows that neighbours are asked for), strain (continuity, velocity gradient, stress), force
+(momentum), move. Materials with shear stiffness use corrected gradients for strain and stress (see corrected.py),
+liquids the symmetric form of Monaghan (2005, Rep. Prog. Phys. 68:1703). Sums over pairs are those of pairs.py.
 """
 
 import functools
@@ -12,25 +12,16 @@ import warp as wp
 
 from fluidbench.method.frame import CARRIED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
-from fluidbench.native.scene import FRICTION, PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
+from fluidbench.native.scene import PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
 
 from .. import constitutive
 from ..aging import DISORDER, rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
-from ..neighbours import (
-    INDEX_BITS,
-    INDEX_MASK,
-    WALL_INSET,
-    Lists,
-    contained,
-    face_kind,
-    image_gradient,
-    image_position,
-    image_rate,
-    image_velocity,
-)
+from ..images import WALL_INSET, contained, image_gradient, image_rate, image_velocity
+from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
+from ..vector_access import store_vec4
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -39,6 +30,16 @@ strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stre
 kernel = warp_func(wendland)
 slope = warp_func(wendland_slope)
 
+FLOOR = wp.constant(0.1)  # least density over that at rest
+CRUSHED = wp.constant(1.0e3)  # density over that at rest that no matter reaches
+WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
+
+# Rows of `strain`: position, mass | velocity, density | carried gradient, rest density.
+MATTER = 12
+# Rows of `force`: position, mass | velocity, then of liquids the pressure term; of what has strength stress (9) and the
+# symmetric velocity gradient (xx yy zz xy xz yz). Where partners differ also density, rest density, viscosity, sound.
+STATE = {(False, False): 8, (True, False): 24, (False, True): 12, (True, True): 28}
+
 
 @wp.struct
 class Smoothing:
@@ -46,6 +47,7 @@ class Smoothing:
 
     h: float  # smoothing length [m]
     spacing: float  # [m]
+    peak: float  # kernel at one spacing [1/m^3]
     viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
     lattice: float  # makes the second moment of a lattice exactly its density [-]
     density_diffusion: float  # delta [-]
@@ -55,309 +57,331 @@ class Smoothing:
     density_feedback: float  # rate at which the integrated density follows the summed one, in c / h [-]
 
 
-FLOOR = wp.constant(0.1)  # least density over that at rest
-CRUSHED = wp.constant(1.0e3)  # density over that at rest that no matter reaches
-WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
+@wp.struct
+class Straining:
+    """What `strain` reads and writes of a particle itself."""
+
+    dt: wp.array(dtype=float)
+    phases: wp.array2d(dtype=Phase)
+    phase_of: wp.array(dtype=int)
+    held: wp.array(dtype=int)
+    elastic_normal: wp.array(dtype=wp.vec3)
+    elastic_shear: wp.array(dtype=wp.vec3)
+    new_density: wp.array(dtype=float)
+    state: wp.array(dtype=wp.vec4)  # rows of `force`
+    rate: wp.array(dtype=wp.mat33)
+    fault: wp.array(dtype=int)
+
+
+@wp.struct
+class Forcing:
+    """What `force` reads and writes of a particle itself."""
+
+    dt: wp.array(dtype=float)
+    phases: wp.array2d(dtype=Phase)
+    phase_of: wp.array(dtype=int)
+    forces: wp.array(dtype=Force)
+    new_density: wp.array(dtype=float)
+    rate: wp.array(dtype=wp.mat33)
+    acceleration: wp.array(dtype=wp.vec3)
+
+
+@wp.kernel
+def pack(
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
+    density: wp.array(dtype=float),
+    carried_gradient: wp.array(dtype=wp.vec3),
+    # outputs
+    matter: wp.array(dtype=wp.vec4),
+):
+    """Rows of `strain`."""
+    i = wp.tid()
+    if i % capacity < count[i / capacity]:
+        x, v, g = position[i], velocity[i], carried_gradient[i]
+        store_vec4(matter, 3 * i, wp.vec4(x[0], x[1], x[2], mass[i]))
+        store_vec4(matter, 3 * i + 1, wp.vec4(v[0], v[1], v[2], density[i]))
+        store_vec4(matter, 3 * i + 2, wp.vec4(g[0], g[1], g[2], rest_density(mass, volume, i)))
+
+
+@wp.func
+def seen_matter(box: Box, data: Straining, row: floats(MATTER), j: int, code: int):
+    """A row of `strain` in the walls."""
+    v = image_velocity(box, wp.vec3(row[4], row[5], row[6]), code)
+    g = image_gradient(box, wp.vec3(row[8], row[9], row[10]), code)
+    for axis in range(3):
+        row[4 + axis] = v[axis]
+        row[8 + axis] = g[axis]
+    return row
 
 
 @functools.cache
-def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
+def passes(strength: bool, viscous: bool, changing: bool, cpu: bool) -> SimpleNamespace:
     """The passes for materials with or without shear stiffness, viscosity, and parameters or rest densities that differ
     between particles: unused physics costs nothing."""
     name = f"{'strength' if strength else 'liquid'}_{'viscous' if viscous else 'inviscid'}"
     name += "_changing" if changing else ""
+    strain = strain_pass(strength, changing).compiled(f"strain_{name}", cpu)
+    force = force_pass(strength, viscous, changing).compiled(f"force_{name}", cpu)
+    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move)
 
-    def strain(
-        num: Smoothing,
-        box: Box,
-        lists: Lists,
-        capacity: int,
-        count: wp.array(dtype=int),
-        dt: wp.array(dtype=float),
-        phases: wp.array2d(dtype=Phase),
-        phase_of: wp.array(dtype=int),
-        held: wp.array(dtype=int),
-        position: wp.array(dtype=wp.vec3),
-        velocity: wp.array(dtype=wp.vec3),
-        mass: wp.array(dtype=float),
-        volume: wp.array(dtype=float),
-        density: wp.array(dtype=float),
-        carried_gradient: wp.array(dtype=wp.vec3),
-        # outputs
-        elastic_normal: wp.array(dtype=wp.vec3),
-        elastic_shear: wp.array(dtype=wp.vec3),
-        new_density: wp.array(dtype=float),
-        pressure_term: wp.array(dtype=float),
-        stress: wp.array(dtype=wp.mat33),
-        rate: wp.array(dtype=wp.mat33),
-        fault: wp.array(dtype=int),
-    ):
-        """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
-        Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
-        `move`).
-        """
-        i = wp.tid()
-        world = i / capacity
-        if i - world * capacity < count[world]:
-            phase = phases[world, phase_of[i]]
-            x = position[i]
-            v = velocity[i]
-            rho = density[i]
-            rest, sound = float(phase.density), float(phase.wave_speed)
+def strain_pass(strength: bool, changing: bool) -> Pass:
+    """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
+
+    Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
+    `move`). Sums: diffusion, the first moment (3); then of liquids the second moment and the inflow, of what has
+    strength the velocity gradient (9) and the second moment (xx yy zz xy xz yz).
+    """
+    sums_of = 19 if strength else 6
+    state_of = STATE[strength, changing] // 4
+    Own, Other, Sums, Strong = floats(MATTER + 4), floats(MATTER), floats(sums_of), floats(19)
+
+    @wp.func
+    def pair(num: Smoothing, own: Own, other: Other, r: wp.vec3):
+        u = wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
+        r2 = wp.dot(r, r)
+        w = other[3] * slope(wp.sqrt(r2) / num.h, num.h)
+        partner = other[7]
+        carried = wp.vec3(other[8], other[9], other[10])
+        if wp.static(changing):
+            # in volumes and compressions: partners may be at rest at another density
+            share = own[11] / other[11]
+            w *= share
+            partner *= share
+            carried *= share
+        spread = w * (own[7] - partner - wp.dot(wp.vec3(own[8], own[9], own[10]) + carried, r))
+        m = w * r
+        if wp.static(strength):
+            return Strong(
+                spread, m[0], m[1], m[2],
+                -u[0] * m[0], -u[0] * m[1], -u[0] * m[2],
+                -u[1] * m[0], -u[1] * m[1], -u[1] * m[2],
+                -u[2] * m[0], -u[2] * m[1], -u[2] * m[2],
+                -m[0] * r[0], -m[1] * r[1], -m[2] * r[2], -m[0] * r[1], -m[0] * r[2], -m[1] * r[2],
+            )  # fmt: skip
+        else:  # noqa: RET505 - Warp compiles one of the two
+            return Sums(spread, m[0], m[1], m[2], -w * r2, wp.dot(m, u))
+
+    @wp.func
+    def finish(num: Smoothing, box: Box, data: Straining, world: int, i: int, own: Own, sums: Sums):
+        phase = data.phases[world, data.phase_of[i]]
+        h = data.dt[world]
+        rho = own[7]
+        rest, sound = float(phase.density), float(phase.wave_speed)
+        if wp.static(changing):
+            rest = own[11]
+            sound = phase.wave_speed * wp.sqrt(phase.density / rest)
+        spread = sums[0]
+        first_moment = wp.vec3(sums[1], sums[2], sums[3])
+        second, inflow = float(0.0), float(0.0)
+        gradient, correction = wp.mat33(), wp.mat33()
+        if wp.static(strength):
+            # density from the corrected gradient, too: the same strain for pressure and for shear
+            moment = wp.mat33(
+                sums[13], sums[16], sums[17], sums[16], sums[14], sums[18], sums[17], sums[18], sums[15]
+            )  # fmt: skip
+            second = wp.trace(moment)
+            correction = symmetric_inverse(moment / rho)
+            gradient = wp.mat33(
+                sums[4], sums[5], sums[6], sums[7], sums[8], sums[9], sums[10], sums[11], sums[12]
+            )  # fmt: skip
+            gradient = gradient * correction / rho
+            data.rate[i] = gradient
+            inflow = -rho * wp.trace(gradient)
+        else:
+            second = sums[4]
+            inflow = sums[5]
+        # The density that particles really have, against the one they integrate, which drifts: applied where the
+        # neighbourhood is complete (it leans to no side), or too crowded for any.
+        drift = second * num.lattice / 3.0 - rho
+        whole = wp.max(1.0 - wp.length(first_moment) * num.h / (WHOLE * rho), 0.0)
+        if drift > 0.0:
+            whole = 1.0
+        tolerance = float(num.density_tolerance)
+        if rest < 0.99 * phase.density:
+            tolerance = wp.max(tolerance, DISORDER)
+        drift = wp.sign(drift) * wp.max(wp.abs(drift) - tolerance * rho, 0.0)
+        if phase.relaxation_rate > 0.0 or rest < 0.99 * phase.density:
+            # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and
+            # would be pulled closer
+            drift = wp.max(drift, wp.min(rest - rho, 0.0))
+        if is_solid(phase):
+            drift = 0.0  # density is its strain: nothing may level it
+            spread = 0.0
+        inflow += num.density_feedback * sound / num.h * whole * drift
+        growth = inflow + 2.0 * num.density_diffusion * num.h * sound * spread / rho
+        rho += h * growth
+        if not (rho > -rest and rho < CRUSHED * rest):
+            wp.atomic_or(data.fault, 0, FAULT_STATE)
+        rho = wp.max(rho, FLOOR * rest)
+        data.new_density[i] = rho
+        p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+        scale = 1.0 / (rho * rho)
+        if wp.static(changing):
+            scale = 1.0  # partners of another density: see `force_pass`
+        at = i * state_of
+        store_vec4(data.state, at, wp.vec4(own[0], own[1], own[2], own[3]))
+        if wp.static(strength):
+            b = data.elastic_normal[i]
+            s = data.elastic_shear[i]
+            if data.held[i] != CARRIED:
+                b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
+                    gradient[0, 0], gradient[0, 1], gradient[0, 2],
+                    gradient[1, 0], gradient[1, 1], gradient[1, 2],
+                    gradient[2, 0], gradient[2, 1], gradient[2, 2],
+                    b[0], b[1], b[2], s[0], s[1], s[2],
+                    phase.shear_modulus,
+                    phase.yield_stress,
+                    phase.plastic_viscosity,
+                    phase.flow_index,
+                    phase.relaxation_rate,
+                    h,
+                )  # fmt: skip
+                b = wp.vec3(b_xx, b_yy, b_zz)
+                s = wp.vec3(b_xy, b_xz, b_yz)
+                data.elastic_normal[i] = b
+                data.elastic_shear[i] = s
+            g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J
+            # With the correction of its gradient stress does on the particles exactly the work of the strain.
+            t = scale * (elastic_stress(g, b, s, p) * correction)
+            d = 0.5 * (gradient + wp.transpose(gradient))
+            store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], t[0, 0]))
+            store_vec4(data.state, at + 2, wp.vec4(t[0, 1], t[0, 2], t[1, 0], t[1, 1]))
+            store_vec4(data.state, at + 3, wp.vec4(t[1, 2], t[2, 0], t[2, 1], t[2, 2]))
+            store_vec4(data.state, at + 4, wp.vec4(d[0, 0], d[1, 1], d[2, 2], d[0, 1]))
+            store_vec4(data.state, at + 5, wp.vec4(d[0, 2], d[1, 2], 0.0, 0.0))
+        else:
+            store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], scale * p))
+        if wp.static(changing):
+            store_vec4(data.state, at + state_of - 1, wp.vec4(rho, rest, phase.viscosity, sound))
+
+    return Pass(Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter)
+
+
+def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
+    """Momentum: pressure or stress, artificial and Newtonian viscosity. Sums: what pushes (3), and what pushes across
+    friction walls (3), which never pull and rub by Coulomb's law."""
+    N = width = STATE[strength, changing]
+    LAST = width - 4
+    Own, Other, Sums = floats(width + 4), floats(width), floats(6)
+
+    @wp.func
+    def begin(num: Smoothing, data: Forcing, world: int, i: int):
+        """Coefficients of artificial and of Newtonian viscosity, where they do not depend on the partner."""
+        phase = data.phases[world, data.phase_of[i]]
+        shock = num.artificial_viscosity * num.h * phase.wave_speed / data.new_density[i]
+        # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j), at rest density: a cavitated liquid, whose density is
+        # low, would break the bound on dt
+        drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
+        return wp.vec4(shock, drag, 0.0, 0.0)
+
+    @wp.func
+    def seen(box: Box, data: Forcing, row: Other, j: int, code: int):
+        v = image_velocity(box, wp.vec3(row[4], row[5], row[6]), code)
+        for axis in range(3):
+            row[4 + axis] = v[axis]
+        if wp.static(strength):
+            t = wp.mat33(row[7], row[8], row[9], row[10], row[11], row[12], row[13], row[14], row[15])
+            t = mirrored_stress(box, t, code)
+            for a in range(3):
+                for b in range(3):
+                    row[7 + 3 * a + b] = t[a, b]
+            # a stick wall turns the antisymmetric part into a symmetric one
+            g = image_rate(box, data.rate[j], code)
+            row[16] = g[0, 0]
+            row[17] = g[1, 1]
+            row[18] = g[2, 2]
+            row[19] = 0.5 * (g[0, 1] + g[1, 0])
+            row[20] = 0.5 * (g[0, 2] + g[2, 0])
+            row[21] = 0.5 * (g[1, 2] + g[2, 1])
+        return row
+
+    @wp.func
+    def pair(num: Smoothing, own: Own, other: Other, r: wp.vec3):
+        u = wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
+        r2 = wp.dot(r, r)
+        q = wp.sqrt(r2) / num.h
+        f = other[3] * slope(q, num.h)
+        ur = wp.dot(u, r)
+        tiny = 0.01 * num.h * num.h
+        shock, drag = float(own[N]), float(own[N + 1])
+        if wp.static(changing):
+            # both partners must find the same force: means of what differs between them
+            fast = own[LAST + 3] + other[LAST + 3]
+            shock = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(own[LAST], other[LAST])
+            thin = 2.0 * own[LAST + 2] * other[LAST + 2] / wp.max(own[LAST + 2] + other[LAST + 2], 1.0e-30)
+            drag = 10.0 * num.viscous_lattice * thin / (own[LAST + 1] * other[LAST + 1])
+        along = float(0.0)
+        push = wp.vec3(0.0, 0.0, 0.0)
+        if wp.static(strength):
+            # artificial viscosity on what the velocity gradients of both do not explain, such as rows that slip past
+            # each other: a smooth flow feels none (Frontiere, Raskin & Owen 2017)
+            stretch = (
+                (own[16] + other[16]) * r[0] * r[0]
+                + (own[17] + other[17]) * r[1] * r[1]
+                + (own[18] + other[18]) * r[2] * r[2]
+                + 2.0 * (own[19] + other[19]) * r[0] * r[1]
+                + 2.0 * (own[20] + other[20]) * r[0] * r[2]
+                + 2.0 * (own[21] + other[21]) * r[1] * r[2]
+            )
+            along = shock * (ur - 0.5 * stretch) / (r2 + tiny)
+            both = wp.mat33(
+                own[7] + other[7], own[8] + other[8], own[9] + other[9],
+                own[10] + other[10], own[11] + other[11], own[12] + other[12],
+                own[13] + other[13], own[14] + other[14], own[15] + other[15],
+            )  # fmt: skip
             if wp.static(changing):
-                rest = rest_density(mass, volume, i)
-                sound = phase.wave_speed * wp.sqrt(phase.density / rest)
-            own_gradient = carried_gradient[i]
-            inv_h = 1.0 / num.h
-            inflow = float(0.0)
-            spread = float(0.0)
-            gradient = wp.mat33()
-            moment = wp.mat33()
-            second = float(0.0)
-            first_moment = wp.vec3(0.0, 0.0, 0.0)
-            start = i * lists.row
-            for k in range(lists.number[i]):
-                entry = lists.entries[start + k * lists.column]
-                j = entry & INDEX_MASK
-                code = entry >> INDEX_BITS
-                xj = position[j]
-                vj = velocity[j]
-                if code > 0:
-                    xj = image_position(box, xj, code)
-                    vj = image_velocity(box, vj, code)
-                r = x - xj
-                u = v - vj
-                w = mass[j] * slope(wp.sqrt(wp.dot(r, r)) * inv_h, num.h)
-                partner_gradient = carried_gradient[j]
-                if code > 0:
-                    partner_gradient = image_gradient(box, partner_gradient, code)
-                partner = density[j]
-                if wp.static(changing):
-                    # in volumes and compressions: partners may be at rest at another density
-                    share = rest / rest_density(mass, volume, j)
-                    w *= share
-                    partner *= share
-                    partner_gradient *= share
-                spread += w * (rho - partner - wp.dot(own_gradient + partner_gradient, r))
-                second -= w * wp.dot(r, r)
-                first_moment += w * r
-                inflow += w * wp.dot(u, r)
-                if wp.static(strength):
-                    gradient -= wp.outer(w * u, r)
-                    moment -= wp.outer(w * r, r)
-            if wp.static(strength):
-                # density from the corrected gradient, too: the same strain for pressure and for shear
-                correction = symmetric_inverse(moment / rho)
-                gradient = gradient * correction / rho
-                rate[i] = gradient
-                inflow = -rho * wp.trace(gradient)
-            # The density that particles really have, against the one they integrate, which drifts: applied where the
-            # neighbourhood is complete (it leans to no side), or too crowded for any.
-            drift = second * num.lattice / 3.0 - rho
-            whole = wp.max(1.0 - wp.length(first_moment) * num.h / (WHOLE * rho), 0.0)
-            if drift > 0.0:
-                whole = 1.0
-            tolerance = float(num.density_tolerance)
-            if rest < 0.99 * phase.density:
-                tolerance = wp.max(tolerance, DISORDER)
-            drift = wp.sign(drift) * wp.max(wp.abs(drift) - tolerance * rho, 0.0)
-            if phase.relaxation_rate > 0.0 or rest < 0.99 * phase.density:
-                # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and
-                # would be pulled closer
-                drift = wp.max(drift, wp.min(rest - rho, 0.0))
-            if is_solid(phase):
-                drift = 0.0  # density is its strain: nothing may level it
-                spread = 0.0
-            inflow += num.density_feedback * sound / num.h * whole * drift
-            h = dt[world]
-            growth = inflow + 2.0 * num.density_diffusion * num.h * sound * spread / rho
-            rho += h * growth
-            if not (rho > -rest and rho < CRUSHED * rest):
-                wp.atomic_or(fault, 0, FAULT_STATE)
-            rho = wp.max(rho, FLOOR * rest)
-            new_density[i] = rho
-            p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-            scale = 1.0 / (rho * rho)
+                # (sigma_i + sigma_j) / (rho_i rho_j): light matter must not feel its heavy partner's mass
+                both *= 1.0 / (own[LAST] * other[LAST])
+            push = both * r
+            # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
+            ratio = kernel(q, num.h) / num.peak
+            along -= num.artificial_stress * wp.max(wp.trace(both) / 3.0, 0.0) * ratio * ratio * ratio * ratio
+        else:
+            both_pressures = own[7] + other[7]
             if wp.static(changing):
-                scale = 1.0  # partners of another density: see `force`
-            if wp.static(strength):
-                b = elastic_normal[i]
-                s = elastic_shear[i]
-                if held[i] != CARRIED:
-                    b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                        gradient[0, 0],
-                        gradient[0, 1],
-                        gradient[0, 2],
-                        gradient[1, 0],
-                        gradient[1, 1],
-                        gradient[1, 2],
-                        gradient[2, 0],
-                        gradient[2, 1],
-                        gradient[2, 2],
-                        b[0],
-                        b[1],
-                        b[2],
-                        s[0],
-                        s[1],
-                        s[2],
-                        phase.shear_modulus,
-                        phase.yield_stress,
-                        phase.plastic_viscosity,
-                        phase.flow_index,
-                        phase.relaxation_rate,
-                        h,
-                    )
-                    b = wp.vec3(b_xx, b_yy, b_zz)
-                    s = wp.vec3(b_xy, b_xz, b_yz)
-                    elastic_normal[i] = b
-                    elastic_shear[i] = s
-                g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J
-                # With the correction of its gradient stress does on the particles exactly the work of the strain.
-                stress[i] = scale * (elastic_stress(g, b, s, p) * correction)
-            else:
-                pressure_term[i] = scale * p
+                both_pressures *= 1.0 / (own[LAST] * other[LAST])
+            # artificial viscosity for approaching particles (Monaghan 1992)
+            along = shock * wp.min(ur, 0.0) / (r2 + tiny) - both_pressures
+        if wp.static(viscous):
+            along += drag * ur / (r2 + 0.01 * tiny)
+        push = f * (push + along * r)
+        return Sums(push[0], push[1], push[2], 0.0, 0.0, 0.0)
 
-    def force(
-        num: Smoothing,
-        box: Box,
-        lists: Lists,
-        capacity: int,
-        count: wp.array(dtype=int),
-        dt: wp.array(dtype=float),
-        phases: wp.array2d(dtype=Phase),
-        phase_of: wp.array(dtype=int),
-        force: wp.array(dtype=Force),
-        position: wp.array(dtype=wp.vec3),
-        velocity: wp.array(dtype=wp.vec3),
-        mass: wp.array(dtype=float),
-        volume: wp.array(dtype=float),
-        density: wp.array(dtype=float),
-        pressure_term: wp.array(dtype=float),
-        stress: wp.array(dtype=wp.mat33),
-        rate: wp.array(dtype=wp.mat33),
-        # outputs
-        acceleration: wp.array(dtype=wp.vec3),
-    ):
-        i = wp.tid()
-        world = i / capacity
-        if i - world * capacity < count[world]:
-            phase = phases[world, phase_of[i]]
-            x = position[i]
-            v = velocity[i]
-            rho = density[i]
-            own = pressure_term[i]
-            own_stress, own_rate = wp.mat33(), wp.mat33()
-            if wp.static(strength):
-                own_stress = stress[i]
-                own_rate = rate[i]
-            inv_h = 1.0 / num.h
-            tiny = 0.01 * num.h * num.h
-            shock = num.artificial_viscosity * num.h * phase.wave_speed / rho
-            drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
-            rest = float(phase.density)
-            if wp.static(changing):
-                rest = rest_density(mass, volume, i)
-                shock = phase.wave_speed * wp.sqrt(phase.density / rest)
-            inv_w = 1.0 / kernel(num.spacing * inv_h, num.h)
-            pull = force_at(force[world], x)
-            a = wp.vec3(0.0, 0.0, 0.0)
-            wall = wp.vec3(0.0, 0.0, 0.0)
-            start = i * lists.row
-            for k in range(lists.number[i]):
-                entry = lists.entries[start + k * lists.column]
-                j = entry & INDEX_MASK
-                code = entry >> INDEX_BITS
-                xj = position[j]
-                vj = velocity[j]
-                if code > 0:
-                    xj = image_position(box, xj, code)
-                    vj = image_velocity(box, vj, code)
-                r = x - xj
-                u = v - vj
-                r2 = wp.dot(r, r)
-                q = wp.sqrt(r2) * inv_h
-                f = mass[j] * slope(q, num.h)
-                ur = wp.dot(u, r)
-                wall_friction_acts, flows = float(shock), float(drag)
-                if wp.static(changing):
-                    # both partners must find the same force: means of what differs between them
-                    other_phase = phases[world, phase_of[j]]
-                    other_rest = rest_density(mass, volume, j)
-                    fast = shock + other_phase.wave_speed * wp.sqrt(other_phase.density / other_rest)
-                    wall_friction_acts = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(rho, density[j])
-                    thin = phase.viscosity * other_phase.viscosity
-                    thin *= 2.0 / wp.max(phase.viscosity + other_phase.viscosity, 1.0e-30)
-                    flows = 10.0 * num.viscous_lattice * thin / (rest * other_rest)
-                scalar = float(0.0)
-                if wp.static(strength):
-                    # artificial viscosity on what the velocity gradients of both do not explain, such as rows that slip
-                    # past each other: a smooth flow feels none (Frontiere, Raskin & Owen 2017)
-                    flow = rate[j]
-                    if code > 0:
-                        flow = image_rate(box, flow, code)
-                    scalar = wall_friction_acts * (ur - 0.5 * wp.dot(r, (own_rate + flow) * r)) / (r2 + tiny)
-                else:
-                    # for approaching particles (Monaghan 1992)
-                    scalar = wall_friction_acts * wp.min(ur, 0.0) / (r2 + tiny)
-                if wp.static(viscous):
-                    # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j), at rest density: a cavitated liquid, whose
-                    # density is low, would break the bound on dt
-                    scalar += flows * ur / (r2 + 0.01 * tiny)
-                push = wp.vec3(0.0, 0.0, 0.0)
-                if wp.static(strength):
-                    other = stress[j]
-                    if code > 0:
-                        other = mirrored_stress(box, other, code)
-                    other += own_stress
-                    if wp.static(changing):
-                        # (sigma_i + sigma_j) / (rho_i rho_j): light matter must not feel its heavy partner's mass
-                        other *= 1.0 / (rho * density[j])
-                    push = other * r
-                    # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
-                    tension = wp.trace(other) / 3.0
-                    if tension > 0.0:
-                        ratio = kernel(q, num.h) * inv_w
-                        scalar -= num.artificial_stress * tension * ratio * ratio * ratio * ratio
-                else:
-                    both = own + pressure_term[j]
-                    if wp.static(changing):
-                        both *= 1.0 / (rho * density[j])
-                    scalar -= both
-                push = f * (push + scalar * r)
-                if code > 0:
-                    for axis in range(3):
-                        if face_kind(box, code, axis) == FRICTION:
-                            wall[axis] = wall[axis] + push[axis]
-                            push[axis] = 0.0
-                a += push
-            # Friction walls push but never pull, and wall_friction by Coulomb's law.
-            for axis in range(3):
-                if wall[axis] != 0.0:
-                    inward = wp.sign(0.5 * (box.lower[axis] + box.upper[axis]) - x[axis])
-                    normal = wp.max(inward * wall[axis], 0.0)
-                    wall_friction = box.lower_friction[axis]
-                    if inward < 0.0:
-                        wall_friction = box.upper_friction[axis]
-                    slide = v + dt[world] * (a + pull)
-                    slide[axis] = 0.0
-                    speed = wp.length(slide)
-                    grip = wp.min(wall_friction * normal, speed / dt[world])
-                    a -= (grip / wp.max(speed, 1.0e-12)) * slide
-                    a[axis] = a[axis] + inward * normal
-            acceleration[i] = a + pull
+    @wp.func
+    def held(rough: wp.vec3, sums: Sums):
+        for axis in range(3):
+            sums[3 + axis] = rough[axis] * sums[axis]
+            sums[axis] = sums[axis] - sums[3 + axis]
+        return sums
 
-    return SimpleNamespace(
-        strain=_named(strain, name),
-        force=_named(force, name),
-        move=move,
-    )
+    @wp.func
+    def finish(num: Smoothing, box: Box, data: Forcing, world: int, i: int, own: Own, sums: Sums):
+        x = wp.vec3(own[0], own[1], own[2])
+        a = wp.vec3(sums[0], sums[1], sums[2])
+        pull = force_at(data.forces[world], x)
+        h = data.dt[world]
+        for axis in range(3):
+            if sums[3 + axis] != 0.0:
+                inward = wp.sign(0.5 * (box.lower[axis] + box.upper[axis]) - x[axis])
+                normal = wp.max(inward * sums[3 + axis], 0.0)
+                friction = box.lower_friction[axis]
+                if inward < 0.0:
+                    friction = box.upper_friction[axis]
+                slide = wp.vec3(own[4], own[5], own[6]) + h * (a + pull)
+                slide[axis] = 0.0
+                speed = wp.length(slide)
+                grip = wp.min(friction * normal, speed / h)
+                a -= (grip / wp.max(speed, 1.0e-12)) * slide
+                a[axis] = a[axis] + inward * normal
+        data.acceleration[i] = a + pull
 
-
-def _named(function, name: str) -> wp.Kernel:
-    """A kernel in a module of its own, under a name that tells its variant."""
-    function.__name__ = f"{function.__name__}_{name}"
-    return wp.kernel(function, module="unique", enable_backward=False)
+    return Pass(Smoothing, Forcing, width, 6, pair, finish, begin, seen, held)
 
 
 @wp.kernel

@@ -21,10 +21,11 @@ from fluidbench.scenario.material import Material
 from .. import aging
 from ..backends import backend_of
 from ..constitutive import STRETCHED
-from ..neighbours import FAULT_NEIGHBOURS, crowded, neighbours_of
-from ..order import CellOrder
+from ..neighbours import crowded, neighbours_of, side_by_side
+from ..pairs import BLOCK
 from ..readout import pressures, shear_stress
-from ..smoothing import wendland_slope
+from ..search import FAULT_NEIGHBOURS
+from ..smoothing import wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
 from . import kernels_warp as kernels
 
@@ -71,8 +72,8 @@ class SolverSPH(Solver):
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigSPH
-    passes = ("lists", "strain", "force", "move")
-    OWN: ClassVar = ("new_density", "pressure_term", "stress", "rate", "acceleration")
+    passes = ("lists", "pack", "strain", "force", "move")
+    OWN: ClassVar = ("matter", "new_density", "state", "rate", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
@@ -146,6 +147,7 @@ class SolverSPH(Solver):
         self.num = kernels.Smoothing()
         self.num.h = config.smoothing(scene.elastic) * scene.spacing
         self.num.spacing = scene.spacing
+        self.num.peak = wendland(scene.spacing / self.num.h, self.num.h)
         second, fourth = lattice_moments(config.smoothing(scene.elastic))
         self.num.lattice, self.num.viscous_lattice = 1.0 / second, fourth**-0.5
         self.num.density_diffusion = config.density_diffusion
@@ -162,14 +164,14 @@ class SolverSPH(Solver):
             pool.add_field("elastic_shear", wp.vec3)
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
+            self.matter = wp.zeros(pool.size * kernels.MATTER // 4, dtype=wp.vec4)
+            self.state = wp.zeros(pool.size * kernels.STATE[scene.elastic, scene.changes] // 4, dtype=wp.vec4)
             self.new_density = wp.zeros(pool.size, dtype=float)
-            self.pressure_term = wp.zeros(pool.size, dtype=float)
-            self.stress = wp.zeros(solid, dtype=wp.mat33)
             self.rate = wp.zeros(solid, dtype=wp.mat33)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
         self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
-        self.pairs = self.neighbours.lists
-        self.order = CellOrder(scene, pool, self.num.h)
+        self._bring_together()
+        self.order = side_by_side(scene, pool)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
@@ -178,7 +180,19 @@ class SolverSPH(Solver):
             from . import kernels_taichi
 
             return kernels_taichi.passes(*variant)
-        return kernels.passes(*variant)
+        return kernels.passes(*variant, self.scene.device.is_cpu)
+
+    def _bring_together(self) -> None:
+        """What the passes over pairs read and write, as they take it."""
+        pool, scene = self.pool, self.scene
+        self.straining, self.forcing = kernels.Straining(), kernels.Forcing()
+        for data in (self.straining, self.forcing):
+            data.dt, data.phases, data.phase_of = scene.dt, scene.phases, pool.phase
+            data.new_density, data.rate = self.new_density, self.rate
+        self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
+        elastic = [pool.elastic_normal, pool.elastic_shear] if scene.elastic else [self.unused, self.unused]
+        self.straining.elastic_normal, self.straining.elastic_shear = elastic
+        self.forcing.forces, self.forcing.acceleration = scene.force, self.acceleration
 
     def _rest_densities(self) -> None:
         """Every slot starts at its world's rest density."""
@@ -218,19 +232,14 @@ class SolverSPH(Solver):
     def lists(self) -> None:
         self.neighbours.update()
 
-    def _common(self) -> list[Any]:
-        pool, scene = self.pool, self.scene
-        return [self.num, scene.box, self.pairs, pool.capacity, pool.count, scene.dt, scene.phases, pool.phase]
-
-    def strain(self) -> None:
+    def pack(self) -> None:
         pool = self.pool
-        elastic = [pool.elastic_normal, pool.elastic_shear] if self.scene.elastic else [self.unused, self.unused]
         self.backend.launch(
-            self.kernels.strain,
+            self.kernels.pack,
             pool.size,
             [
-                *self._common(),
-                pool.held,
+                pool.capacity,
+                pool.count,
                 pool.position,
                 pool.velocity,
                 pool.mass,
@@ -238,28 +247,19 @@ class SolverSPH(Solver):
                 pool.density,
                 pool.carried_gradient,
             ],
-            [*elastic, self.new_density, self.pressure_term, self.stress, self.rate, pool.fault],
+            [self.matter],
         )
 
+    def _over_pairs(self, kernel: Any, rows: wp.array, data: Any) -> None:
+        lists = self.neighbours
+        common = [self.num, self.scene.box, lists.lists, self.pool.capacity, self.pool.count]
+        self.backend.launch(kernel, lists.work, [*common, rows, data], block_dim=BLOCK)
+
+    def strain(self) -> None:
+        self._over_pairs(self.kernels.strain, self.matter, self.straining)
+
     def force(self) -> None:
-        pool = self.pool
-        self.backend.launch(
-            self.kernels.force,
-            pool.size,
-            [
-                *self._common(),
-                self.scene.force,
-                pool.position,
-                pool.velocity,
-                pool.mass,
-                pool.volume,
-                self.new_density,
-                self.pressure_term,
-                self.stress,
-                self.rate,
-            ],
-            [self.acceleration],
-        )
+        self._over_pairs(self.kernels.force, self.state, self.forcing)
 
     def move(self) -> None:
         pool, scene = self.pool, self.scene

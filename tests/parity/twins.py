@@ -8,15 +8,33 @@ import warp as wp
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.method.target import BACKENDS, Target
+from fluidbench.native.scene import PERIODIC
 from fluidbench.native.simulation import Simulation
 from fluidbench.scenario import Scenario
+from solvers.images import INDEX_BITS, INDEX_MASK
 from solvers.pbd.bonds import DAMPED
 from solvers.pbd.laws import conveyed_modulus
 
 TOLERANCE = 2e-5  # float32; sums may be taken in another order
 GRID = ("raw", "fill", "moving")
-BY_CHANCE = ("table", "block_of", "bonds.partner", "bonds.rest")  # in the order in which threads come, on a GPU
+BY_CHANCE = ("table", "block_of")  # in the order in which threads come, on a GPU
 GARBAGE = 1.0e6  # in slots that nobody may touch
+OWN_LISTS = ("neighbours.entries", "neighbours.number", "neighbours.inside")  # each language goes through its own
+# Rows that neighbours are asked for: which of their floats are one quantity, and judged by its size.
+PLACE, VELOCITY = [(0, 3), (3, 4)], (4, 7)
+ROWS = {
+    "matter": [*PLACE, VELOCITY, (7, 8), (8, 11), (11, 12)],
+    "places": PLACE,
+    "pushes": [*PLACE, (4, 5)],
+    "moving": [*PLACE, VELOCITY],
+    "pulling": [*PLACE, VELOCITY, (7, 16)],
+}
+STATES = {
+    8: [*PLACE, VELOCITY, (7, 8)],
+    12: [*PLACE, VELOCITY, *((k, k + 1) for k in range(7, 12))],
+    24: [*PLACE, VELOCITY, (7, 16), (16, 22)],
+    28: [*PLACE, VELOCITY, (7, 16), (16, 22), *((k, k + 1) for k in range(24, 28))],
+}
 
 
 class Difference(AssertionError):
@@ -58,11 +76,12 @@ class Twins:
         self.taichi.pool.counts = list(self.warp.pool.counts)
         self.taichi.solver.started = True  # MPM gathers the affine field of its first state once
         self.ours, self.theirs = arrays_of(self.warp), arrays_of(self.taichi)
-        self.shared = [name for name in self.ours if name in self.theirs]
+        self.shared = [name for name in self.ours if name in self.theirs and name not in OWN_LISTS]
         for name in ("raw", "moving", "fill"):  # scratch that begins as it was found
             if name in self.ours:
                 self.ours[name].zero_()
         self.least = self._least_scales()
+        self.warp.solver.refresh()  # lists are each language's own: both make them
         self.equalise()
 
     def _least_scales(self) -> dict[str, float]:
@@ -73,13 +92,13 @@ class Twins:
             return {}
         masses = sim.pool.mass.numpy()
         step = DAMPED * sim.scene.spacing / 2.0  # that a bond between equals takes when it is off by a spacing
-        least = {"multiplier": 1.0, "stretch.correction": step, "bonds.multiplier": step * masses[masses > 0].min()}
+        least = {"pushes[4:5]": 1.0, "stretch.correction": step, "bonds.multiplier": step * masses[masses > 0].min()}
         if not sim.scene.flowing:
             return least
         modulus, density = (float(sim.scene.phases.numpy()[key].max()) for key in ("shear_modulus", "density"))
         dt = float(sim.scene.dt.numpy()[0])
         acts = conveyed_modulus(modulus, sim.config.shear_stiffness, density, sim.scene.spacing, dt)
-        return least | {"stress": acts}
+        return least | {"pulling[7:16]": acts}
 
     def equalise(self) -> None:
         """Give Taichi's twin the state of Warp's."""
@@ -140,6 +159,7 @@ class Twins:
             skipped |= set() if network is not None else {"bind", "stretch"}
             skipped |= set() if scene.flowing else {"strain", "pull"}
             skipped |= set() if scene.viscous else {"shear"}
+            skipped |= set() if scene.viscous or scene.flowing else {"pack", "settle"}
         for name in self.warp.solver.passes:
             if name not in skipped:
                 yield name, lambda solver, name=name: getattr(solver, name)()
@@ -149,13 +169,17 @@ class Twins:
 
     def differences(self, after: str) -> Iterator[str]:
         """One sentence for every array that is not the same after a pass."""
+        if after == "lists":
+            yield from self._lists()
+        if after == "bind":
+            yield from self._bonds()
         by_chance = not self.warp.scene.device.is_cpu or self.taichi.target.threads > 1
         for name in self.shared:
-            if name in BY_CHANCE and by_chance:
+            if (name in BY_CHANCE and by_chance) or (after == "bind" and name in ("bonds.partner", "bonds.rest")):
                 continue
             a, b = self.ours[name].numpy(), self.theirs[name].numpy()
-            if name == "neighbours.entries":
-                yield from self._lists(a, b)
+            if self.method != "mpm" and (name in ROWS or name == "state"):
+                yield from self._rows(name, a, b)
             elif self.method == "mpm" and name in GRID:
                 yield from self._nodes(name, a, b)
             elif a.dtype.kind == "f":
@@ -185,14 +209,61 @@ class Twins:
             if not off.max(initial=0.0) <= TOLERANCE:
                 yield f"{name}: {what} differ by {off.max():.2g} of their size"
 
-    def _lists(self, a: np.ndarray, b: np.ndarray) -> Iterator[str]:
-        """Neighbour lists are sets: what they hold counts, not in which order."""
-        limit, number = self.warp.solver.neighbours.limit, self.ours["neighbours.number"].numpy()
-        held = np.arange(limit) < number[:, None]
-        by_slot = self.warp.solver.neighbours.column == 1  # on a GPU the lists lie side by side instead
-        first, second = (
-            np.sort(np.where(held, x.reshape(-1, limit) if by_slot else x.reshape(limit, -1).T, -1), axis=1)
-            for x in (a, b)
-        )
-        if (first != second).any():
-            yield f"neighbours.entries differ for {int((first != second).any(axis=1).sum())} particles"
+    def _rows(self, name: str, a: np.ndarray, b: np.ndarray) -> Iterator[str]:
+        """Packed rows, quantity by quantity."""
+        size = self.warp.pool.size
+        if len(a) < size:  # not used by this scene
+            return
+        a, b = a.reshape(size, -1), b.reshape(size, -1)
+        for first, last in ROWS.get(name) or STATES[a.shape[1]]:
+            x, y = a[:, first:last], b[:, first:last]
+            scale = max(float(np.abs(x).max()), self.least.get(f"{name}[{first}:{last}]", 1e-30))
+            off = float(np.abs(x.astype(float) - y).max()) / scale
+            if not off <= TOLERANCE:
+                yield f"{name}[{first}:{last}] differs by {off:.2g} of its size"
+
+    def _lists(self) -> Iterator[str]:
+        """Who is in whose reach: a set for each particle, whoever shares a list with it and in which order."""
+        first, second = (self._in_reach(sim) for sim in (self.warp, self.taichi))
+        wrong = [i for i in first if first[i] != second[i]]
+        if wrong:
+            odd = first[wrong[0]] ^ second[wrong[0]]
+            yield f"neighbours differ for {len(wrong)} particles, such as {wrong[0]} by {odd}"
+
+    def _bonds(self) -> Iterator[str]:
+        """The bonds of each particle, in whatever order its list had."""
+        number = self.ours["bonds.number"].numpy()
+        partners, lengths = [], []
+        for found in (self.ours, self.theirs):
+            partner, rest = (found[f"bonds.{name}"].numpy().reshape(-1, len(number)) for name in ("partner", "rest"))
+            made = np.arange(len(partner))[:, None] < number
+            order = np.argsort(np.where(made, partner, np.iinfo(np.int32).max), axis=0, kind="stable")
+            partners.append(np.take_along_axis(np.where(made, partner, -1), order, 0))
+            lengths.append(np.take_along_axis(np.where(made, rest, 0.0), order, 0))
+        if (partners[0] != partners[1]).any():
+            yield f"bonds.partner differs in {int((partners[0] != partners[1]).sum())} places"
+        elif not np.abs(lengths[0] - lengths[1]).max() <= TOLERANCE * self.warp.scene.spacing:
+            yield "bonds.rest differs"
+
+    def _in_reach(self, sim: Simulation) -> dict[int, set[int]]:
+        """The entries that each particle finds, itself left out, well within its reach."""
+        neighbours, pool, box = sim.solver.neighbours, sim.pool, sim.scene.box
+        lists = neighbours.lists
+        entries, number = neighbours.entries.numpy(), neighbours.number.numpy()
+        position = self.warp.pool.position.numpy().astype(float)
+        faces = [(box.lower[a], box.upper[a], box.lower_kind[a] == PERIODIC) for a in range(3)]
+        found = {}
+        for world, count in enumerate(pool.counts):
+            for i in range(world * pool.capacity, world * pool.capacity + count):
+                group = i // lists.group
+                k = np.arange(number[group])
+                listed = entries[group * lists.row + k // lists.threads * lists.column + k % lists.threads]
+                x = position[listed & INDEX_MASK]
+                for axis, (low, high, periodic) in enumerate(faces):
+                    which = (listed >> INDEX_BITS) // 3**axis % 3
+                    mirrored = [2.0 * low - x[:, axis], 2.0 * high - x[:, axis]]
+                    shifted = [x[:, axis] - (high - low), x[:, axis] + (high - low)]
+                    x[:, axis] = np.choose(which, [x[:, axis], *(shifted if periodic else mirrored)])
+                near = np.linalg.norm(x - position[i], axis=1) < (1.0 - 1e-5) * neighbours.reach
+                found[i] = set(listed[near & (listed != i)].tolist())
+        return found

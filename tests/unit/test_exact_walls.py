@@ -9,7 +9,7 @@ import warp as wp
 from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Box, Scene
 from solvers import corrected, neighbours
 from solvers.corrected import least_eigenvalue, mirrored_stress, symmetric_inverse
-from solvers.neighbours import (
+from solvers.images import (
     contained,
     face_kind,
     has_choice,
@@ -194,8 +194,20 @@ def test_lists_have_room_for_matter_that_is_1_7_times_as_dense():
     for ratio in (1.2, 2.0, 3.0):
         most = 1.7 * 4 / 3 * math.pi * ratio**3
         assert most <= neighbours.room(ratio) < most + 24 and neighbours.room(ratio) % 16 == 8
-    assert neighbours._grid_shape(1) == (32, 32, 32) and neighbours._grid_shape(64**3) == (64,) * 3
-    assert neighbours._grid_shape(10**9) == (256,) * 3
+
+
+def test_few_particles_are_shared_by_more_threads_as_long_as_each_has_enough_to_do():
+    assert [neighbours.threads_for(n, 200) for n in (10**9, 2**16, 2**15, 2**14, 2**13, 1)] == [4, 4, 8, 16, 16, 16]
+    assert [neighbours.threads_for(1, n) for n in (10, 60, 100, 250, 1000)] == [4, 4, 8, 16, 32]
+
+
+def test_a_grid_of_cells_covers_the_domain_or_repeats_itself():
+    assert neighbours.sides_for([1.0, 6.0, 14.0], 10**6) == [4, 8, 16] and neighbours.sides_for([14.1], 10**6) == [32]
+    assert neighbours.sides_for([1000.0, 1000.0, 3.0], 1000) == [8, 16, 8] and neighbours.sides_for([1e6] * 3, 1) == [
+        4,
+        4,
+        4,
+    ]
 
 
 def test_a_moment_is_inverted_where_it_is_sound_and_left_where_it_is_not():
