@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .scenario.fill import fill
     from .scenario.library import define, load
     from .study.ablate import ablate
+    from .study.bench import bench
     from .study.case import Case, Curve, Finding, Number
     from .study.compare import compare, run
     from .study.select import select
@@ -33,6 +34,7 @@ __all__ = [
     "Number",
     "Scenario",
     "ablate",
+    "bench",
     "compare",
     "define",
     "fill",
@@ -58,6 +60,7 @@ _ROOMS = {
     "run": "study.compare",
     "validate": "study.validate",
     "stability": "study.stability",
+    "bench": "study.bench",
     "ablate": "study.ablate",
     "select": "study.select",
     "table1": "paper.table1",

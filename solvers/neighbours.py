@@ -132,6 +132,11 @@ class Neighbours:
         """The lists as they are: made anew, they would be summed over in another order."""
         return {name: getattr(self, name) for name in ("entries", "number", "inside", "listed", "outdated")}
 
+    def traffic(self, rows: Sequence[int]) -> dict[str, float]:
+        """Bytes of passes that ask these many floats of each neighbour: lists are streamed, rows come from caches."""
+        entries = float(self.number.numpy().sum())
+        return {"memory": 4.0 * entries * len(rows), "cache": 4.0 * entries * sum(rows)}
+
     def footprint(self) -> dict[str, int]:
         lists = (self.entries, self.number, self.inside, self.listed)
         return {

@@ -168,7 +168,7 @@ def fraction(text: str) -> float:
 def count_of(text: str, option: str) -> int:
     """'298000' -> 298000; raises UserError for what is no positive whole number."""
     if not (text.isascii() and text.isdecimal()) or len(text) > 30 or int(text) == 0:
-        raise UserError(f"{option} takes whole numbers such as 298000, or fit; got {quoted(text)}")
+        raise UserError(f"{option} takes whole numbers such as 298000; got {quoted(text)}")
     return int(text)
 
 

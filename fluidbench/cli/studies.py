@@ -1,4 +1,4 @@
-"""stability, ablate, select, table1 and table2: studies made of many runs."""
+"""stability, bench, ablate, select, table1 and table2: studies made of many runs."""
 
 from typing import Annotated, Any
 
@@ -51,6 +51,30 @@ def stability(
     resolved = load_scenario(scenario, set_, spacing)
     axes = [] if axis is None else names_in(axis, "--axis", "axis")
     finish(study(resolved, methods_in(solvers), axes=axes, quick=quick, **placed(options, "stability")))
+
+
+@app.command()
+@running(wall_limit=600.0)
+def bench(
+    solvers: Solvers = None,
+    particles: Annotated[
+        str | None,
+        typer.Option(help="sizes, separated by commas; default 2197,17576 on the CPU and 17576,300763 on a GPU"),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="a second for each block instead of five")] = False,
+    *,
+    options: Any,
+) -> None:
+    """Measure what this machine does: the substep of every method alone, beside what its memory allows.
+
+    Blocks of liquid and of paste at rest, one at a time, always anew.
+    """
+    from ..study.bench import bench as study
+
+    sizes = (
+        None if particles is None else [count_of(n, "--particles") for n in names_in(particles, "--particles", "size")]
+    )
+    finish(study(methods_in(solvers), particles=sizes, quick=quick, **placed(options, "bench")))
 
 
 @app.command()

@@ -119,6 +119,11 @@ class Session(ABC):
     def capacity(self) -> int:
         """Particles that there is room for."""
 
+    def traffic(self) -> dict[str, float] | None:
+        """Bytes that a substep moves at the least, "memory" (streamed once) and "cache" (read again and again); None
+        where that is not known."""
+        return None
+
     def statistics(self) -> dict[str, Any]:
         """More that belongs into the run's record, as JSON can hold it."""
         return {}

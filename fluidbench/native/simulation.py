@@ -258,6 +258,14 @@ class Simulation(Session):
             for name, size in part.footprint().items()
         }
 
+    def traffic(self) -> dict[str, float] | None:
+        """The solver's, and each of its particles' fields read and written once."""
+        found = self.solver.traffic()
+        if found is not None:
+            used = sum(self.pool.counts) / self.pool.size
+            found["memory"] += 2.0 * used * sum(self.pool.footprint().values())
+        return found
+
     def statistics(self) -> dict[str, Any]:
         """Launches of kernels: of a substep, and of the processes a tick."""
         process = self.process_launches.count / max(self.aged, 1)

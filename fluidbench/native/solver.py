@@ -86,6 +86,10 @@ class Solver(Method):
         none, or where a method carries it otherwise than by particle."""
         return None
 
+    def traffic(self) -> dict[str, float] | None:
+        """Bytes of a substep beside the pool's, see Session.traffic."""
+        return None
+
     @abstractmethod
     def footprint(self) -> dict[str, int]:
         """Bytes allocated by the method itself, by part."""

@@ -358,6 +358,13 @@ class SolverPBD(Solver):
     def densities(self) -> np.ndarray:
         return present_density(self.pool, 1.0 / np.maximum(self.fill.numpy(), 1.0))
 
+    def traffic(self) -> dict[str, float]:
+        """Bonds left out."""
+        rows = [kernels.PLACE, kernels.PUSH] * self.config.iterations
+        rows += [kernels.MOVING, kernels.PULLING] * self.scene.flowing
+        rows += [kernels.MOVING] * self.config.shear_sweeps * self.scene.viscous
+        return self.neighbours.traffic(rows)
+
     def footprint(self) -> dict[str, int]:
         own = ("motion", "correction", "smoothed", "fill", "places", "pushes", "moving", "pulling")
         bytes_of = {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()

@@ -305,6 +305,9 @@ class SolverSPH(Solver):
     def shear_stresses(self) -> np.ndarray | None:
         return shear_stress(self.scene, self.pool)
 
+    def traffic(self) -> dict[str, float]:
+        return self.neighbours.traffic([kernels.MATTER, kernels.STATE[self.scene.elastic, self.scene.changes]])
+
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}
         return own | self.neighbours.footprint()
