@@ -16,7 +16,8 @@ import tempfile
 import time
 
 from fluidbench.method.target import BACKENDS, Target
-from fluidbench.registry import method_names
+from fluidbench.native.solver import Solver
+from fluidbench.registry import get_method, method_names
 from fluidbench.scenario.library import load
 
 WARMUP_TICKS = 3
@@ -68,7 +69,8 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--particles", type=int, default=25_000)
     parser.add_argument("--seconds", type=float, default=5.0)
-    parser.add_argument("--solvers", default=",".join(method_names()))
+    native = [name for name in method_names() if issubclass(get_method(name), Solver)]
+    parser.add_argument("--solvers", default=",".join(native))
     parser.add_argument("--one", help=argparse.SUPPRESS)
     a = parser.parse_args()
     if a.one:

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .vector_access import from_last, last_of_warp, store_vec4, sum_before
+from fluidbench.native.vector_access import from_last, last_of_warp, store_vec4, sum_before
 
 wp.set_module_options({"enable_backward": False})
 NOBODY = wp.constant(-1)

@@ -18,11 +18,11 @@ from typing import Any
 import warp as wp
 
 from fluidbench.native.scene import Box
+from fluidbench.native.vector_access import joined, load_int, load_vec4
 
 from .images import INDEX_BITS, INDEX_MASK, image_position, rough_faces
 from .neighbours import LANES
 from .search import FAR, Lists
-from .vector_access import joined, load_int, load_vec4
 
 OWN = 4  # further floats that a particle brings to its pairs, which no neighbour is asked for
 BLOCK = 128  # threads of a block on a GPU
@@ -78,8 +78,9 @@ class Pass:
         """The kernel, in a module of its own; launched with `work` threads (neighbours.py)."""
         function = (_side_by_side if cpu else _in_teams)(self)
         function.__name__ = function.__qualname__ = name
-        # LLVM unrolls what is short by itself, and vectorises the loop over particles only if Warp leaves it a loop
-        options = {"fast_math": True, "enable_backward": False} | ({"max_unroll": 1} if cpu else {})
+        # LLVM makes vectors of the loop over particles only if Warp leaves it one; shorter loops Warp must unroll, and
+        # none within it may be so long that LLVM does not
+        options = {"fast_math": True, "enable_backward": False} | ({"max_unroll": LANES - 1} if cpu else {})
         bounds = (BLOCK, BLOCKS) if self.row + self.sums >= HEAVY else None
         return wp.kernel(function, module="unique", enable_backward=False, module_options=options, launch_bounds=bounds)
 
@@ -134,8 +135,9 @@ def _side_by_side(p: Pass) -> Callable:
             other = read(rows, j)
             for lane in range(wp.static(LANES)):
                 own = Own()
-                for c in range(wp.static(N + OWN)):
-                    own[c] = owns[c, lane]
+                for q in range(wp.static((N + OWN) // 4)):
+                    for c in range(4):
+                        own[4 * q + c] = owns[4 * q + c, lane]
                 r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
                 r[0] = wp.where(j == first + lane, FAR, r[0])
                 add = pair(num, own, other, r)
@@ -153,8 +155,9 @@ def _side_by_side(p: Pass) -> Callable:
             rough = rough_faces(box, code)
             for lane in range(wp.static(LANES)):
                 own = Own()
-                for c in range(wp.static(N + OWN)):
-                    own[c] = owns[c, lane]
+                for q in range(wp.static((N + OWN) // 4)):
+                    for c in range(4):
+                        own[4 * q + c] = owns[4 * q + c, lane]
                 r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
                 add = held(rough, pair(num, own, other, r))
                 for c in range(wp.static(F)):
@@ -162,8 +165,9 @@ def _side_by_side(p: Pass) -> Callable:
         for lane in range(wp.static(LANES)):
             if first + lane - world * capacity < count[world]:
                 own = Own()
-                for c in range(wp.static(N + OWN)):
-                    own[c] = owns[c, lane]
+                for q in range(wp.static((N + OWN) // 4)):
+                    for c in range(4):
+                        own[4 * q + c] = owns[4 * q + c, lane]
                 sums = Sums()
                 for c in range(wp.static(F)):
                     sums[c] = totals[c, lane]

@@ -3,10 +3,10 @@
 import warp as wp
 
 from fluidbench.native.scene import Box
+from fluidbench.native.vector_access import largest_of_warp, load_vec4, ranked
 
 from .cells import NOBODY, Cells, bucket_of, cell_of, place
 from .images import INDEX_BITS, INDEX_MASK, has_choice, image_position, near_faces, opposite
-from .vector_access import largest_of_warp, load_vec4, ranked
 
 wp.set_module_options({"enable_backward": False})
 FAULT_NEIGHBOURS = 4

@@ -5,6 +5,7 @@ import time
 import warp as wp
 
 from .device import quiet_warp
+from .vector_access import load_vec4, store_vec4
 
 quiet_warp()
 wp.set_module_options({"enable_backward": False})
@@ -16,23 +17,22 @@ SECONDS = 0.2  # that a measurement takes, at least
 @wp.kernel
 def stream(source: wp.array(dtype=wp.vec4), target: wp.array(dtype=wp.vec4)):
     i = wp.tid()
-    target[i] = source[i]
+    store_vec4(target, i, load_vec4(source, i))
 
 
 @wp.kernel
 def gather(mask: int, source: wp.array(dtype=wp.vec4), target: wp.array(dtype=wp.vec4)):
-    """Reads from places near by that follow no pattern, as those of neighbours."""
+    """Reads from all over the 16 kB around, time and again."""
     i = wp.tid()
     total = wp.vec4()
-    at = i
     for k in range(GATHERS):
-        at = i + ((k * 40503) & 1023)
-        total += source[at & mask]
-    target[i] = total
+        total += load_vec4(source, (i + ((k * 40503) & 1023)) & mask)
+    store_vec4(target, i, total)
 
 
 def bandwidth(device: str) -> dict[str, float]:
-    """Bytes a second that a device (one thread of the CPU) streams to and from memory, and gathers from its caches."""
+    """Bytes a second that a device (one thread of the CPU) streams to and from memory, and reads from its nearest
+    caches."""
     on_cpu = wp.get_device(device).is_cpu
     large, small = (2**24, 2**16) if on_cpu else (2**27, 2**20)  # 256 MB and 1 MB; 2 GB and 16 MB
     with wp.ScopedDevice(device):

@@ -28,8 +28,8 @@ def report(rows: Sequence[Row], target: Target) -> Report:
     subtitle = "A block of material at rest in a closed box; substeps alone, compilation apart"
     if sound:
         subtitle += (
-            f"; on {target.device}, whose memory streams {sound[0]['memory_GB_per_s']:.3g} GB/s and whose caches give "
-            f"{sound[0]['cache_GB_per_s']:.3g} GB/s to scattered reads" + (" (one thread)" * (target.device == "cpu"))
+            f"; on {target.device}, whose memory streams {sound[0]['memory_GB_per_s']:.3g} GB/s and whose nearest "
+            f"caches give {sound[0]['cache_GB_per_s']:.3g} GB/s" + (" (one thread)" * (target.device == "cpu"))
         )
     return Report(
         "bench",

@@ -12,11 +12,11 @@ import warp as wp
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Force, Phase, force_at, is_solid, too_fast
+from fluidbench.native.vector_access import add_vec4, in_company, load_vec4, run_of
 
 from .. import constitutive
 from ..bind import rebound, warp_func
 from ..smoothing import quadratic_spline
-from ..vector_access import add_vec4, in_company, load_vec4, run_of
 from .grid import (
     FIRST,
     Grid,

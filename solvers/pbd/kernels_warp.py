@@ -14,6 +14,7 @@ import warp as wp
 from fluidbench.method.frame import CARRIED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Box, Force, Phase, force_at, too_fast
+from fluidbench.native.vector_access import store_vec4
 
 from .. import constitutive
 from ..aging import rest_density
@@ -22,7 +23,6 @@ from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..images import WALL_INSET, contained, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import poly6, spiky, spiky_slope
-from ..vector_access import store_vec4
 from . import laws
 from .bonds import bonded
 from .walls import pushed, wall_friction

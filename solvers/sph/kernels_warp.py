@@ -13,6 +13,7 @@ import warp as wp
 from fluidbench.method.frame import CARRIED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
+from fluidbench.native.vector_access import store_vec4
 
 from .. import constitutive
 from ..aging import DISORDER, rest_density
@@ -21,7 +22,6 @@ from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..images import WALL_INSET, contained, image_gradient, image_rate, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
-from ..vector_access import store_vec4
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -355,10 +355,8 @@ def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
 
     @wp.func
     def held(rough: wp.vec3, sums: Sums):
-        for axis in range(3):
-            sums[3 + axis] = rough[axis] * sums[axis]
-            sums[axis] = sums[axis] - sums[3 + axis]
-        return sums
+        x, y, z = rough[0] * sums[0], rough[1] * sums[1], rough[2] * sums[2]
+        return Sums(sums[0] - x, sums[1] - y, sums[2] - z, x, y, z)
 
     @wp.func
     def finish(num: Smoothing, box: Box, data: Forcing, world: int, i: int, own: Own, sums: Sums):
