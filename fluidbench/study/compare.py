@@ -58,13 +58,13 @@ def compare(
     require_number(checkpoint_every, "checkpoint_every", 0.0)
     if render_every is not None:
         require_number(render_every, "render_every", 1e-9)
-    if not verb.replace("-", "").replace("_", "").isalnum():
-        raise UserError(f"verb: a plain name is wanted (got {quoted(verb)})")
     languages = backends or [options.get("backend", DEFAULT_BACKEND)]
     threads = options.get("threads", 1)
     one = threads if len(languages) == 1 else 1
     place = Workplace.of({**options, "backend": languages[0], "threads": one}, WALL_LIMIT, names)
     targets = targets_of(place.target.device, languages, threads)
+    if not verb.replace("-", "").replace("_", "").isalnum():
+        raise UserError(f"verb: a plain name is wanted (got {quoted(verb)})")
     planned = jobs(
         resolved,
         names,
