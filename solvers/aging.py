@@ -7,6 +7,7 @@ Growth: rest volume grows while the present volume stays, so fresh foam is under
 
 import warp as wp
 
+from fluidbench.native.crew import index_of
 from fluidbench.native.scene import Phase
 
 from . import constitutive
@@ -47,6 +48,7 @@ def rest_density(mass: wp.array(dtype=float), volume: wp.array(dtype=float), i: 
 
 @wp.kernel
 def swell(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
@@ -55,7 +57,7 @@ def swell(
     volume: wp.array(dtype=float),
 ):
     """Rest volume grows at `growth` [1/s]."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and growth[i] > 0.0:
         volume[i] = volume[i] * wp.exp(growth[i] * dt[world])
@@ -63,6 +65,7 @@ def swell(
 
 @wp.kernel
 def swell_at_volume(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
@@ -72,7 +75,7 @@ def swell_at_volume(
     volume_ratio: wp.array(dtype=float),
 ):
     """The same for a method that integrates J: an eigenstrain, the present volume V0 J stays."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and growth[i] > 0.0:
         factor = wp.exp(growth[i] * dt[world])

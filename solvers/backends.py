@@ -10,6 +10,8 @@ from typing import Any, Protocol
 import warp as wp
 
 from fluidbench.errors import UserError
+from fluidbench.native.crew import Crew
+from fluidbench.native.scene import Scene
 
 
 class Backend(Protocol):
@@ -31,17 +33,12 @@ class Backend(Protocol):
 
 
 class Warp:
-    """Warp's launches, which a graph may capture; one thread on the CPU."""
+    """Warp's launches, which a graph may capture, shared out by the scene's crew."""
 
     name = "warp"
 
-    def __init__(self, device: wp.Device) -> None:
-        self.device = device
-
-    def launch(
-        self, kernel: Any, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
-    ) -> None:
-        wp.launch(kernel, size, inputs, outputs, device=self.device, block_dim=block_dim)
+    def __init__(self, crew: Crew) -> None:
+        self.device, self.launch = crew.device, crew.launch
 
     def prepare(self, solver: Any) -> None:
         for name in {kernel.module.name for kernel in vars(solver.kernels).values()}:
@@ -51,14 +48,14 @@ class Warp:
         wp.synchronize_device(self.device)
 
 
-def backend_of(name: str, device: wp.Device, threads: int) -> Backend:
-    """The backend of this name on a device; raises UserError where it is not installed."""
+def backend_of(name: str, scene: Scene, threads: int) -> Backend:
+    """The backend of this name on a scene's device; raises UserError where it is not installed."""
     if name == "warp":
-        return Warp(device)
+        return Warp(scene.crew)
     try:
         from .taichi_bridge import Taichi
     except ImportError as error:
         raise UserError(
             f"the backend taichi cannot be loaded ({error}): pip install taichi (its wheels end at Python 3.13)"
         ) from None
-    return Taichi(device, threads)
+    return Taichi(scene.device, threads)

@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from fluidbench.native.crew import index_of
 from fluidbench.native.vector_access import from_last, last_of_warp, store_vec4, sum_before
 
 wp.set_module_options({"enable_backward": False})
@@ -81,10 +82,10 @@ def gather(cells: Cells):
 
 
 @wp.kernel
-def rank(position: wp.array(dtype=wp.vec3), cells: Cells):
+def rank(share: wp.vec3i, position: wp.array(dtype=wp.vec3), cells: Cells):
     """The members of a bucket by rising index: lists then are the same every time, and neighbouring threads that go
     through one read side by side."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     bucket = cells.bucket[i]
     if bucket >= 0:
         start = cells.start[bucket]

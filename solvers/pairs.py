@@ -17,6 +17,7 @@ from typing import Any
 
 import warp as wp
 
+from fluidbench.native.crew import index_of
 from fluidbench.native.scene import Box
 from fluidbench.native.vector_access import joined, load_int, load_vec4
 
@@ -109,6 +110,7 @@ def _side_by_side(p: Pass) -> Callable:
     read, begin, seen, pair, held, finish = _reader(N), p.begin, p.seen, p.pair, p.held, p.finish
 
     def sweep(
+        share: wp.vec3i,
         num: p.num,
         box: Box,
         lists: Lists,
@@ -117,7 +119,7 @@ def _side_by_side(p: Pass) -> Callable:
         rows: wp.array(dtype=wp.vec4),
         data: p.data,
     ):
-        group = wp.tid()
+        group = index_of(share, wp.tid())
         first = group * LANES
         world = first / capacity
         owns = Rows()

@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from fluidbench.native.crew import index_of, raise_fault
 from fluidbench.native.scene import Box
 from fluidbench.native.vector_access import largest_of_warp, load_vec4, ranked
 
@@ -37,6 +38,7 @@ def place_of(lists: Lists, g: int, k: int):
 
 @wp.kernel
 def watch(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
@@ -46,7 +48,7 @@ def watch(
     outdated: wp.array(dtype=int),
 ):
     """Mark the lists outdated once a particle has moved half the skin since they were made."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     if i % capacity < count[i / capacity]:
         if wp.length_sq(position[i] - listed[i]) > limit2:
             outdated[0] = 1
@@ -90,6 +92,7 @@ def either(a: wp.vec3i, b: wp.vec3i):
 
 @wp.kernel
 def fill_lists(
+    share: wp.vec3i,
     box: Box,
     capacity: int,
     count: wp.array(dtype=int),
@@ -108,7 +111,7 @@ def fill_lists(
     Periodic images are found by asking the cells at the shifted place. Mirror images need no search: a particle is
     never farther away than its image, so they are among the particles just found.
     """
-    g = wp.tid()
+    g = index_of(share, wp.tid())
     begin = g * lists.group
     world = begin / capacity
     end = wp.min(begin + lists.group, world * capacity + count[world])
@@ -162,7 +165,7 @@ def fill_lists(
                                 lists.entries[place_of(lists, g, n)] = j + (code << INDEX_BITS)
                             n += 1
     if n > limit:
-        wp.atomic_or(fault, 0, FAULT_NEIGHBOURS)
+        raise_fault(fault, FAULT_NEIGHBOURS)
     lists.number[g] = wp.min(n, limit)
     if g == 0:
         outdated[0] = 0
@@ -256,7 +259,7 @@ def fill_in_teams(
                 n = enlist(lists, i, entry, limit, n)
     if member == 0:
         if n > limit:
-            wp.atomic_or(fault, 0, FAULT_NEIGHBOURS)
+            raise_fault(fault, FAULT_NEIGHBOURS)
         lists.number[i] = wp.min(n, limit)
     if thread == 0:
         outdated[0] = 0

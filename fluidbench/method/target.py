@@ -11,7 +11,7 @@ BACKENDS = {"warp": "warp-lang", "taichi": "taichi"}  # the packages that they c
 
 @dataclass(frozen=True)
 class Target:
-    """Device, language of the kernels, and threads on the CPU; Warp runs one thread there.
+    """Device, language of the kernels, and threads on the CPU.
 
     Raises UserError for Taichi on a second GPU, which it would not use.
     """
@@ -23,7 +23,7 @@ class Target:
     def __post_init__(self) -> None:
         if self.backend == "taichi" and self.device not in ("cpu", "cuda:0"):
             raise UserError(f"the backend taichi runs on cuda:0 alone, not on {self.device}; set CUDA_VISIBLE_DEVICES")
-        if self.backend == "warp" or self.device != "cpu":
+        if self.device != "cpu":
             object.__setattr__(self, "threads", 1)
 
     @property

@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from ..method.vitals import Vital, complaint, mass_energy
+from .crew import raise_fault
 from .pool import FAULT_ASTRAY, FAULT_STATE, Pool
 from .scene import Box, Force, Scene, force_potential
 
@@ -114,7 +115,7 @@ def audit(
                     values[i] = 0.5 * (low + high)
             i += lanes
     if broken:
-        wp.atomic_or(fault, 0, wp.where(fields.holds[field] == PLACES, FAULT_ASTRAY, FAULT_STATE))
+        raise_fault(fault, wp.where(fields.holds[field] == PLACES, FAULT_ASTRAY, FAULT_STATE))
 
 
 class Health:

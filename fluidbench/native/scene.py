@@ -13,6 +13,7 @@ from ..errors import UserError
 from ..method.vitals import top_speed
 from ..scenario import Friction, Scenario
 from ..scenario.material import Material
+from .crew import Crew
 from .device import quiet_warp
 
 quiet_warp()
@@ -90,10 +91,11 @@ class Scene:
     """What a solver sees of the scenarios. `dt`, `force` and `phases` are device arrays, so that a captured graph
     survives a change of their values."""
 
-    def __init__(self, scenarios: Scenario | Sequence[Scenario], device: str = "cpu") -> None:
+    def __init__(self, scenarios: Scenario | Sequence[Scenario], device: str = "cpu", threads: int = 1) -> None:
         self.scenarios = [scenarios] if isinstance(scenarios, Scenario) else list(scenarios)
         self.scenario = self.scenarios[0]
         self.device = wp.get_device(device)
+        self.crew = Crew(self.device, threads)
         self.worlds = len(self.scenarios)
         self._check_worlds()
         self.spacing = self.scenario.spacing

@@ -53,7 +53,7 @@ class Simulation(Session):
             raise TypeError(f"{solver_class.name} has sessions of its own")
         check_backend(solver_class, target)
         self.target = target
-        self.scene = Scene(scenarios, target.device)
+        self.scene = Scene(scenarios, target.device, target.threads if target.backend == DEFAULT_BACKEND else 1)
         self.scenario = self.scene.scenario
         self.config = configure(solver_class, self.scenario) if config is None else config
         for scenario in self.scene.scenarios:
@@ -220,13 +220,10 @@ class Simulation(Session):
         each = 1 if self.scene.device.is_cpu else substeps
         if each not in self._graphs:
             self.substep_launches = CountedLaunches()
-            with self.substep_launches, wp.ScopedCapture(device=self.scene.device) as capture:
-                for _ in range(each):
-                    self._substep()
+            with self.substep_launches:
+                self._graphs[each] = self.scene.crew.record(lambda: [self._substep() for _ in range(each)])
             self.substep_launches.count //= each
-            self._graphs[each] = capture.graph
-        for _ in range(substeps // each):
-            wp.capture_launch(self._graphs[each])
+        self.scene.crew.replay(self._graphs[each], substeps // each)
 
     def _launch(self, substeps: int) -> None:
         """Launch `substeps` substeps one by one, between those of Warp that came before and come after."""

@@ -9,7 +9,9 @@ import numpy as np
 import warp as wp
 
 from fluidbench.errors import UserError
+from fluidbench.native.crew import claimed, drawn, index_of, raise_fault
 from fluidbench.native.scene import Scene
+from fluidbench.native.vector_access import in_company
 from fluidbench.scenario import Domain
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -79,6 +81,16 @@ def grid_of(scene: Scene, wanted: float) -> Grid:
 
 
 @wp.func
+def turns(lane: int, lanes: int, n: int):
+    """(first, end, step) of a lane's items of n: side by side with other lanes on a GPU, one piece on the CPU."""
+    first, end, step = int(lane), int(n), int(lanes)
+    if not in_company():
+        piece = (n + lanes - 1) / lanes
+        first, end, step = lane * piece, wp.min((lane + 1) * piece, n), 1
+    return first, end, step
+
+
+@wp.func
 def wrapped(node: int, first: int, wrap: int):
     """Index of a node on a periodic axis of `wrap` cells; unchanged on a walled one (wrap = 0)."""
     inside = node
@@ -112,14 +124,14 @@ def activate_block(
     """Give the block of node (i, j, k) a slot unless it has one."""
     b = (((i >> 2) * grid.blocks[1] + (j >> 2)) * grid.blocks[2] + (k >> 2)) + world * grid.blocks_per_world
     if table[b] == 0:
-        if wp.atomic_cas(table, b, 0, -1) == 0:
-            slot = wp.atomic_add(active, 0, 1)
+        if claimed(table, b):
+            slot = drawn(active, 0)
             if slot < block_of.shape[0]:
                 block_of[slot] = b
                 table[b] = slot + 1
             else:
                 table[b] = 0
-                wp.atomic_or(fault, 0, FAULT_BLOCKS)
+                raise_fault(fault, FAULT_BLOCKS)
 
 
 @wp.func
@@ -222,10 +234,9 @@ def find_blocks(
 
 
 @wp.kernel
-def clear_grid(active: wp.array(dtype=int), lanes: int, raw: wp.array(dtype=wp.vec4)):
+def clear_grid(share: wp.vec3i, active: wp.array(dtype=int), lanes: int, raw: wp.array(dtype=wp.vec4)):
     """Empty the nodes of all active blocks."""
-    t = wp.tid()
-    n = wp.min(active[0] * 64, raw.shape[0])
-    while t < n:
+    t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, raw.shape[0]))
+    while t < end:
         raw[t] = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        t += lanes
+        t += step

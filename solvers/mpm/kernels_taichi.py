@@ -51,7 +51,7 @@ from .grid_taichi import (
     slots_in_use,
     wrapped,
 )
-from .kernels_warp import ANCHOR, ANCHORED, FAULT_STENCIL, Feedback
+from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, Feedback
 
 spline = taichi_func(quadratic_spline)
 FeedbackT = struct_of(Feedback)

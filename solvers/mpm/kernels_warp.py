@@ -9,14 +9,12 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.method.frame import CARRIED, CLAMPED, FREE
-from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import Force, Phase, force_at, is_solid, too_fast
+from fluidbench.method.frame import CARRIED
+from fluidbench.native.crew import index_of, raise_fault
+from fluidbench.native.scene import Force, Phase, force_at
 from fluidbench.native.vector_access import add_vec4, in_company, load_vec4, run_of
 
-from .. import constitutive
-from ..bind import rebound, warp_func
-from ..smoothing import quadratic_spline
+from ..bind import rebound
 from .grid import (
     FIRST,
     Grid,
@@ -28,61 +26,14 @@ from .grid import (
     node_parts,
     reset_blocks,
     slots_of,
+    turns,
 )
+from .particle import FAULT_STENCIL, Feedback, columns_scaled, inertia, moved, spline, strained, taken
 from .walls import flipped, folded, grip, mirror, near_wall, plane_share, unbound, wall_kind, wall_velocity
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-pressure = warp_func(constitutive.pressure)
-strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
-spline = warp_func(quadratic_spline)
 EXPANDS = False  # whether rest densities may differ, see `passes`
-FAULT_STENCIL = 2
-# Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
-# they share: a beam falls slowly off it.
-ANCHOR = wp.constant(1.0e4)
-ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
-
-
-@wp.func
-def columns_scaled(m: wp.mat33, by: wp.vec3):
-    """m diag(by)."""
-    return wp.mat33(
-        m[0, 0] * by[0],
-        m[0, 1] * by[1],
-        m[0, 2] * by[2],
-        m[1, 0] * by[0],
-        m[1, 1] * by[1],
-        m[1, 2] * by[2],
-        m[2, 0] * by[0],
-        m[2, 1] * by[1],
-        m[2, 2] * by[2],
-    )
-
-
-@wp.func
-def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocity_gradient: wp.mat33):
-    """Kirchhoff stress [Pa] from J, the elastic tensor (b: diagonal, s: xy, xz, yz) and the velocity gradient."""
-    p = volume_ratio * pressure(1.0 / volume_ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-    g = phase.shear_modulus
-    m = g * (b[0] + b[1] + b[2]) / 3.0 + p
-    tau = wp.mat33(
-        g * b[0] - m,
-        g * s[0],
-        g * s[1],
-        g * s[0],
-        g * b[1] - m,
-        g * s[2],
-        g * s[1],
-        g * s[2],
-        g * b[2] - m,
-    )
-    if phase.viscosity > 0.0:
-        rate = 0.5 * (velocity_gradient + wp.transpose(velocity_gradient))
-        mean = wp.trace(rate) / 3.0
-        # A liquid that has cavitated (J > 1) must not break the bound on dt.
-        tau += (2.0 * wp.min(volume_ratio, 1.0) * phase.viscosity) * (rate - wp.diag(wp.vec3(mean, mean, mean)))
-    return tau
 
 
 def p2g(
@@ -119,50 +70,9 @@ def p2g(
         if not in_company():
             return
         p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
-    h = dt[world]
     phase = phases[world, phase_of[p]]
-    c = affine[p]
-    j = volume_ratio[p]
-    b = elastic_normal[p]
-    s = elastic_shear[p]
-    m = mass[p]
-    if held[p] == CLAMPED:
-        m *= ANCHOR
-    a = wp.mat33()
-    if held[p] == FREE:
-        a = m * c
-    if held[p] != CARRIED and on:
-        j *= wp.max(1.0 + h * wp.trace(c), 0.1)
-        volume_ratio[p] = j
-        if phase.shear_modulus > 0.0:
-            b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                c[0, 0],
-                c[0, 1],
-                c[0, 2],
-                c[1, 0],
-                c[1, 1],
-                c[1, 2],
-                c[2, 0],
-                c[2, 1],
-                c[2, 2],
-                b[0],
-                b[1],
-                b[2],
-                s[0],
-                s[1],
-                s[2],
-                phase.shear_modulus,
-                phase.yield_stress,
-                phase.plastic_viscosity,
-                phase.flow_index,
-                phase.relaxation_rate,
-                h,
-            )
-            b = wp.vec3(b_xx, b_yy, b_zz)
-            s = wp.vec3(b_xy, b_xz, b_yz)
-            elastic_normal[p] = b
-            elastic_shear[p] = s
-        a -= columns_scaled(kirchhoff(phase, j, b, s, c), (4.0 * h * volume[p]) * wp.cw_mul(grid.inv_dx, grid.inv_dx))
+    m = inertia(mass[p], held[p])
+    a = strained(grid, dt[world], phase, p, on, affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear)
     base = first_node(grid, position[p])
     f = wp.cw_mul(position[p] - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
     wx0, wx1, wx2 = spline(f[0])
@@ -172,12 +82,11 @@ def p2g(
     bx, by, bz, lx, ly, lz = node_parts(grid, base)
     s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
     if on and wp.min(wp.min(wp.min(s0, s1), wp.min(s2, s3)), wp.min(wp.min(s4, s5), wp.min(s6, s7))) < 0:
-        wp.atomic_or(fault, 0, FAULT_STENCIL)
+        raise_fault(fault, FAULT_STENCIL)
         on = False
     run = run_of(wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1))
     if not on and not in_company():
         return
-    a = columns_scaled(a, grid.dx)
     momentum = m * velocity[p] - a * f
     for o in range(3):
         low = bx[o] == bx[0]
@@ -200,6 +109,7 @@ def p2g(
 
 
 def grid_step(
+    share: wp.vec3i,
     grid: Grid,
     lanes: int,
     active: wp.array(dtype=int),
@@ -219,9 +129,8 @@ def grid_step(
     Ghost nodes behind a mirroring wall get the mirrored velocity of their partner, so that the gather sees a true
     mirror: zeroing them instead costs energy at every step.
     """
-    t = wp.tid()
-    n = wp.min(active[0] * 64, raw.shape[0])
-    while t < n:
+    t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, raw.shape[0]))
+    while t < end:
         block = block_of[t >> 6]
         world = block / grid.blocks_per_world
         node = node_of(grid, block - world * grid.blocks_per_world, t & 63)
@@ -264,32 +173,7 @@ def grid_step(
             if hold < 1.0:
                 result = hold * result + (1.0 - hold) * unbound(raw[t], kick, result[3])
         moving[t] = result
-        t += lanes
-
-
-@wp.func
-def contained(grid: Grid, x: wp.vec3):
-    """A position wrapped along periodic axes and kept in front of walls."""
-    out = x
-    for axis in range(3):
-        low, high = grid.lower[axis], grid.upper[axis]
-        if grid.wrap[axis] > 0:
-            if out[axis] < low:
-                out[axis] = out[axis] + (high - low)
-            elif out[axis] >= high:
-                out[axis] = out[axis] - (high - low)
-        else:
-            skin = 1.0e-3 * grid.dx[axis]
-            out[axis] = wp.clamp(out[axis], low + skin, high - skin)
-    return out
-
-
-@wp.struct
-class Feedback:
-    """How the density on the grid corrects the volume ratio that particles integrate, and so drifts."""
-
-    rate: float  # over the wave speed [1/m]
-    tolerance: float  # overlap that is left alone [-]
+        t += step
 
 
 @wp.kernel
@@ -352,26 +236,8 @@ def g2p(
                 v += wx[o] * vx
                 cx += (wx[o] * (float(o) - f[0])) * vx
             affine[p] = columns_scaled(wp.matrix_from_cols(cx, cy, cz), 4.0 * grid.inv_dx)
-            if held[p] == FREE:
-                velocity[p] = v
-            else:
-                v = velocity[p]
-            j = volume_ratio[p]
-            phase = phases[world, phase_of[p]]
-            crowding = j * density / phase.density - 1.0 - feedback.tolerance
-            if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
-                volume_ratio[p] = j * (1.0 - wp.min(dt[world] * feedback.rate * phase.wave_speed * crowding, 0.1))
-        free = x + dt[world] * v
-        if too_fast(v, grid.top_speed):
-            wp.atomic_or(fault, 0, FAULT_ASTRAY)
-        x = contained(grid, free)
-        position[p] = x
-        for axis in range(3):
-            if x[axis] != free[axis] and grid.wrap[axis] == 0:
-                stopped = velocity[p]
-                stopped[axis] = 0.0
-                velocity[p] = stopped
-        after = first_node(grid, x)
+            v = taken(p, v, density, phases[world, phase_of[p]], dt[world], feedback, held, velocity, volume_ratio)
+        after = moved(grid, x, v, dt[world], p, position, velocity, fault)
         if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
             activate_stencil(grid, world, after, table, block_of, active, fault)
 

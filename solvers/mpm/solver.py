@@ -24,7 +24,9 @@ from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
 from ..theory import mpm_numbers, stable_dt
 from . import kernels_warp as kernels
+from .by_block import ByBlock
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
+from .particle import FAULT_STENCIL, Feedback
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
 ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
@@ -54,7 +56,7 @@ class SolverMPM(Solver):
     passes = ("clear_grid", "p2g", "grid_step", "g2p")
     faults: ClassVar = {
         FAULT_BLOCKS: "material spread over more grid blocks than allocated; raise numerics.mpm.blocks_per_particle",
-        kernels.FAULT_STENCIL: "a particle left the blocks of the grid within one step",
+        FAULT_STENCIL: "a particle left the blocks of the grid within one step",
     }
 
     typical_rate, typical_bytes = 3.5e6, 2500.0
@@ -111,11 +113,11 @@ class SolverMPM(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.backend = backend_of(backend, scene.device, threads)
+        self.backend = backend_of(backend, scene, threads)
         self.threads = threads
         self.kernels = self.kernels_of(backend)
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
-        self.feedback = kernels.Feedback()
+        self.feedback = Feedback()
         self.feedback.rate = config.volume_feedback / min(self.grid.dx)
         self.feedback.tolerance = max(config.volume_tolerance, aging.DISORDER if scene.expands else 0.0)
         blocks = self.grid.blocks_per_world * scene.worlds
@@ -135,7 +137,9 @@ class SolverMPM(Solver):
         self.order = CellOrder(
             scene, pool, np.array(self.grid.dx), shift=0.5
         )  # particles of one cell share their 27 nodes
-        self.node_lanes = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
+        self.by_block = ByBlock(scene, pool, slots) if scene.device.is_cpu and backend == "warp" else None
+        many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
+        self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
@@ -155,6 +159,8 @@ class SolverMPM(Solver):
             [self.grid, pool.capacity, pool.count, pool.position],
             [self.table, self.block_of, self.active, pool.fault],
         )
+        if self.by_block is not None:
+            self.by_block.refresh()
         if not self.started:
             self._start_affine()
 
@@ -181,12 +187,11 @@ class SolverMPM(Solver):
 
     def swell(self) -> None:
         pool = self.pool
-        wp.launch(
+        self.scene.crew.launch(
             aging.swell_at_volume,
             pool.size,
             [pool.capacity, pool.count, self.scene.dt, pool.growth],
             [pool.volume, pool.volume_ratio],
-            device=self.scene.device,
         )
 
     def harden(self, due: wp.array) -> None:
@@ -205,6 +210,9 @@ class SolverMPM(Solver):
 
     def p2g(self) -> None:
         pool, scene = self.pool, self.scene
+        if self.by_block is not None:
+            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, [self.raw, self.fill])
+            return
         self._launch(
             "p2g",
             pool.size,
@@ -249,6 +257,9 @@ class SolverMPM(Solver):
 
     def g2p(self) -> None:
         pool, scene = self.pool, self.scene
+        if self.by_block is not None:
+            self.by_block.g2p(self.grid, self.moving, self.feedback, self.table, self.block_of, self.active)
+            return
         self._launch(
             "g2p",
             pool.size,
@@ -279,6 +290,8 @@ class SolverMPM(Solver):
         if self.scene.changes:
             wp.load_module(aging, device=self.scene.device)
         self.backend.prepare(self)
+        if self.by_block is not None:
+            self.by_block.prepare()
         self.started = False
 
     def resume(self) -> None:
@@ -311,4 +324,5 @@ class SolverMPM(Solver):
 
     def footprint(self) -> dict[str, int]:
         names = ("table", "block_of", "raw", "moving", *(["fill"] if self.scene.expands else []))
-        return {name: getattr(self, name).capacity for name in names}
+        more = {} if self.by_block is None else self.by_block.footprint()
+        return {name: getattr(self, name).capacity for name in names} | more

@@ -11,6 +11,7 @@ from typing import Any
 import warp as wp
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.crew import index_of, raise_fault
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import PERIODIC, SLIP, STICK, Box, Phase, Scene, is_solid
 
@@ -91,6 +92,7 @@ def mirrors_only(box: Box, code: int):
 
 @wp.kernel
 def awaken(
+    share: wp.vec3i,
     box: Box,
     spacing: float,
     capacity: int,
@@ -104,7 +106,7 @@ def awaken(
     velocity: wp.array(dtype=wp.vec3),
 ):
     """Particles that have just come free may bond in this substep; those on a stick wall become part of it."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and bonded(phases[world, phase_of[i]]):
         state = bonds.state[i]
@@ -128,7 +130,7 @@ def add_bond(bonds: Bonds, i: int, partner: int, rest: float, fault: wp.array(dt
         bonds.rest[k * bonds.number.shape[0] + i] = rest
     else:
         wp.atomic_add(bonds.number, i, -1)
-        wp.atomic_or(fault, 0, FAULT_BONDS)
+        raise_fault(fault, FAULT_BONDS)
 
 
 @wp.kernel
@@ -163,6 +165,7 @@ def bind(
 
 @wp.kernel
 def stretch(
+    share: wp.vec3i,
     box: Box,
     spacing: float,
     sweep: int,
@@ -179,7 +182,7 @@ def stretch(
     correction: wp.array(dtype=wp.vec3),
 ):
     """One damped Jacobi sweep over all bonds (eq. 18 of the paper); both ends of a bond compute the same multiplier."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world]:
         shift = wp.vec3(0.0, 0.0, 0.0)
@@ -240,6 +243,7 @@ def relieve(
 
 @wp.kernel
 def yield_bonds(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     box: Box,
@@ -250,7 +254,7 @@ def yield_bonds(
 ):
     """Perfect plasticity: a bond stretched or shortened beyond the yield strain takes on the length that it has, but
     for that strain. In uniaxial stress it is sqrt(3) tau_y / E."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world]:
         for k in range(bonds.number[i]):

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.crew import index_of, raise_fault
 from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Box, Force, Phase, force_at, too_fast
 from fluidbench.native.vector_access import store_vec4
@@ -66,6 +67,7 @@ vec5, vec6, vec15 = floats(5), floats(6), floats(15)
 
 @wp.kernel
 def predict(
+    share: wp.vec3i,
     num: Numbers,
     box: Box,
     capacity: int,
@@ -83,7 +85,7 @@ def predict(
 ):
     """Position under the present velocity and gravity. `motion` carries the displacement of the substep by itself: as a
     difference of float32 positions it would lose the velocity at small dt."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world]:
         h = dt[world]
@@ -92,7 +94,7 @@ def predict(
             v += h * force_at(force[world], position[i])
         free = position[i] + h * v
         if too_fast(v, HURRIED * box.top_speed):
-            wp.atomic_or(fault, 0, FAULT_ASTRAY)
+            raise_fault(fault, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
         motion[i] = h * v + pushed(box, free, x)
         position[i] = x
@@ -165,6 +167,7 @@ correct = Pass(Numbers, Constraining, PUSH, 3, correct_pair, correct_finish)
 
 @wp.kernel
 def apply(
+    share: wp.vec3i,
     num: Numbers,
     box: Box,
     capacity: int,
@@ -179,7 +182,7 @@ def apply(
     fault: wp.array(dtype=int),
 ):
     """Move by the correction, at most a quarter of a spacing, and stay inside the walls."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     if i % capacity < count[i / capacity] and held[i] == FREE:
         shift = correction[i]
         length = wp.length(shift)
@@ -188,7 +191,7 @@ def apply(
             shift = shift * (limit / length)
         free = position[i] + shift
         if not (length <= FARTHEST * num.spacing):
-            wp.atomic_or(fault, 0, FAULT_ASTRAY)
+            raise_fault(fault, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
         motion[i] = motion[i] + shift + pushed(box, free, x)
         position[i] = x
@@ -197,6 +200,7 @@ def apply(
 
 @wp.kernel
 def velocities(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
@@ -206,7 +210,7 @@ def velocities(
     velocity: wp.array(dtype=wp.vec3),
 ):
     """v = displacement / dt."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
         velocity[i] = motion[i] / dt[world]
@@ -214,6 +218,7 @@ def velocities(
 
 @wp.kernel
 def pack(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
@@ -223,7 +228,7 @@ def pack(
     moving: wp.array(dtype=wp.vec4),
 ):
     """Rows of velocities."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     if i % capacity < count[i / capacity]:
         x, v = position[i], velocity[i]
         store_vec4(moving, 2 * i, wp.vec4(x[0], x[1], x[2], volume[i]))
@@ -232,6 +237,7 @@ def pack(
 
 @wp.kernel
 def settle(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     smoothed: wp.array(dtype=wp.vec3),
@@ -240,7 +246,7 @@ def settle(
     moving: wp.array(dtype=wp.vec4),
 ):
     """Velocities that a sum over pairs has found, in place of those it was taken of."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     if i % capacity < count[i / capacity]:
         v = smoothed[i]
         velocity[i] = v

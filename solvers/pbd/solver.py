@@ -148,7 +148,7 @@ class SolverPBD(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.backend = backend_of(backend, scene.device, threads)
+        self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
         self.num = kernels.Numbers()
         self.num.support = config.support_ratio * scene.spacing
@@ -241,12 +241,11 @@ class SolverPBD(Solver):
         return [self.pool.capacity, self.pool.count]
 
     def swell(self) -> None:
-        wp.launch(
+        self.scene.crew.launch(
             aging.swell,
             self.pool.size,
             [*self._active(), self.scene.dt, self.pool.growth],
             [self.pool.volume],
-            device=self.scene.device,
         )
 
     def harden(self, due: wp.array) -> None:

@@ -3,6 +3,7 @@
 import warp as wp
 
 from fluidbench.method.frame import FREE
+from fluidbench.native.crew import index_of
 from fluidbench.native.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
 
 from .bonds import bonded
@@ -29,6 +30,7 @@ def rubbing(kind: int, gap: float, spacing: float, solid: bool):
 
 @wp.kernel
 def wall_friction(
+    share: wp.vec3i,
     box: Box,
     capacity: int,
     count: wp.array(dtype=int),
@@ -43,7 +45,7 @@ def wall_friction(
     velocity: wp.array(dtype=wp.vec3),
 ):
     """Particles touching a friction wall lose tangential speed by Coulomb's law; solids on a stick wall all of it."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
         v = velocity[i]

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.crew import index_of, raise_fault
 from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
 from fluidbench.native.vector_access import store_vec4
@@ -88,6 +89,7 @@ class Forcing:
 
 @wp.kernel
 def pack(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
@@ -100,7 +102,7 @@ def pack(
     matter: wp.array(dtype=wp.vec4),
 ):
     """Rows of `strain`."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     if i % capacity < count[i / capacity]:
         x, v, g = position[i], velocity[i], carried_gradient[i]
         store_vec4(matter, 3 * i, wp.vec4(x[0], x[1], x[2], mass[i]))
@@ -217,7 +219,7 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
         growth = inflow + 2.0 * num.density_diffusion * num.h * sound * spread / rho
         rho += h * growth
         if not (rho > -rest and rho < CRUSHED * rest):
-            wp.atomic_or(data.fault, 0, FAULT_STATE)
+            raise_fault(data.fault, FAULT_STATE)
         rho = wp.max(rho, FLOOR * rest)
         data.new_density[i] = rho
         p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
@@ -384,6 +386,7 @@ def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
 
 @wp.kernel
 def move(
+    share: wp.vec3i,
     box: Box,
     spacing: float,
     capacity: int,
@@ -409,7 +412,7 @@ def move(
     `carried_gradient` is half the density gradient of the pressure that carries the particle, rho^2 (g - a) / K: that
     of hydrostatic equilibrium for a liquid at rest (Fourtakas et al. 2019, Comput. Fluids 190:346), none in free fall.
     """
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world]:
         h = dt[world]
@@ -424,7 +427,7 @@ def move(
         carried_gradient[i] = carried
         free = position[i] + h * v
         if too_fast(v, box.top_speed):
-            wp.atomic_or(fault, 0, FAULT_ASTRAY)
+            raise_fault(fault, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * spacing)
         for axis in range(3):
             if x[axis] != free[axis] and box.lower_kind[axis] != PERIODIC:

@@ -142,7 +142,7 @@ class SolverSPH(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.backend = backend_of(backend, scene.device, threads)
+        self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
         self.num = kernels.Smoothing()
         self.num.h = config.smoothing(scene.elastic) * scene.spacing
@@ -210,12 +210,11 @@ class SolverSPH(Solver):
 
     def swell(self) -> None:
         pool = self.pool
-        wp.launch(
+        self.scene.crew.launch(
             aging.swell,
             pool.size,
             [pool.capacity, pool.count, self.scene.dt, pool.growth],
             [pool.volume],
-            device=self.scene.device,
         )
 
     def harden(self, due: wp.array) -> None:

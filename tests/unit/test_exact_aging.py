@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+from fluidbench.native.crew import Crew
 from fluidbench.native.scene import Scene
 from solvers import aging
 
@@ -86,11 +87,12 @@ def test_pressure_carries_over_where_density_is_integrated(density):
 
 def test_rest_volumes_grow_by_their_rate():
     """exp(rate dt); what integrates J keeps V0 J."""
+    launch = Crew(wp.get_device("cpu")).launch
     count, dt, growth = wp.array([2], dtype=int), numbers(0.25), numbers(2.0, 0.0, 2.0)
     volume, ratio = numbers(3.0, 3.0, 3.0), numbers(0.9, 0.9, 0.9)
-    wp.launch(aging.swell, 3, [3, count, dt, growth], [volume])
+    launch(aging.swell, 3, [3, count, dt, growth], [volume])
     assert volume.numpy() == pytest.approx([3.0 * math.exp(0.5), 3.0, 3.0])
     volume = numbers(3.0, 3.0, 3.0)
-    wp.launch(aging.swell_at_volume, 3, [3, count, dt, growth], [volume, ratio])
+    launch(aging.swell_at_volume, 3, [3, count, dt, growth], [volume, ratio])
     assert volume.numpy() == pytest.approx([3.0 * math.exp(0.5), 3.0, 3.0])
     assert ratio.numpy() == pytest.approx([0.9 * math.exp(-0.5), 0.9, 0.9])

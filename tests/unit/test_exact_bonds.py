@@ -7,11 +7,14 @@ import pytest
 import warp as wp
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.crew import Crew
 from fluidbench.native.scene import Scene
 from solvers.pbd import bonds
 from solvers.pbd.laws import bond_stiffness
 
 from ..conftest import scenario
+
+LAUNCH = Crew(wp.get_device("cpu")).launch
 
 E, E2, D, MASS = 1e4, 4e4, 0.01, 1e-3
 SOLID = {"density": 1000.0, "youngs_modulus": E, "poisson_ratio": 0.25}
@@ -47,12 +50,12 @@ class Pair:
         return self.rest()
 
     def flow(self):
-        wp.launch(bonds.yield_bonds, 2, [2, self.count, self.box, self.table, self.phase, self.position, self.bonds])
+        LAUNCH(bonds.yield_bonds, 2, [2, self.count, self.box, self.table, self.phase, self.position, self.bonds])
         return self.rest()
 
     def stretch(self, sweep=0):
         correction = wp.zeros(2, dtype=wp.vec3)
-        wp.launch(
+        LAUNCH(
             bonds.stretch,
             2,
             [

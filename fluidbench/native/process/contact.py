@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from ...method.frame import FREE
+from ..crew import index_of
 from ..pool import Pool
 from ..scene import Scene
 
@@ -54,6 +55,7 @@ def surface(parts: Parts, k: int, r: wp.vec3):
 
 @wp.kernel
 def collide(
+    share: wp.vec3i,
     parts: Parts,
     spacing: float,
     capacity: int,
@@ -65,7 +67,7 @@ def collide(
     velocity: wp.array(dtype=wp.vec3),
 ):
     """Take the approach out of every touching particle's velocity, and friction out of its sliding."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
         h = dt[world]
@@ -123,14 +125,13 @@ class Contact:
 
     def substep(self) -> None:
         """Enqueue the contact of one substep; captured with the solver's own."""
-        pool, device = self.pool, self.scene.device
-        wp.launch(pass_time, 1, [self.scene.dt], [self.parts.elapsed], device=device)
-        wp.launch(
+        pool, launch = self.pool, self.scene.crew.launch
+        launch(pass_time, 1, [self.scene.dt], [self.parts.elapsed])
+        launch(
             collide,
             pool.size,
             [self.parts, self.scene.spacing, pool.capacity, pool.count, self.scene.dt, pool.held, pool.position],
             [pool.velocity],
-            device=device,
         )
 
     def footprint(self) -> dict[str, int]:

@@ -1,0 +1,223 @@
+"""What a particle of MPM does in a step, whatever way it reaches its nodes: strain, stress, motion."""
+
+import warp as wp
+
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.crew import raise_fault
+from fluidbench.native.pool import FAULT_ASTRAY
+from fluidbench.native.scene import Phase, is_solid, too_fast
+
+from .. import constitutive
+from ..bind import warp_func
+from ..smoothing import quadratic_spline
+from .grid import Grid, first_node
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+pressure = warp_func(constitutive.pressure)
+strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
+spline = warp_func(quadratic_spline)
+FAULT_STENCIL = 2
+# Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
+# they share: a beam falls slowly off it.
+ANCHOR = wp.constant(1.0e4)
+ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
+
+
+@wp.func
+def columns_scaled(m: wp.mat33, by: wp.vec3):
+    """m diag(by)."""
+    return wp.mat33(
+        m[0, 0] * by[0],
+        m[0, 1] * by[1],
+        m[0, 2] * by[2],
+        m[1, 0] * by[0],
+        m[1, 1] * by[1],
+        m[1, 2] * by[2],
+        m[2, 0] * by[0],
+        m[2, 1] * by[1],
+        m[2, 2] * by[2],
+    )
+
+
+@wp.func
+def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocity_gradient: wp.mat33):
+    """Kirchhoff stress [Pa] from J, the elastic tensor (b: diagonal, s: xy, xz, yz) and the velocity gradient."""
+    p = volume_ratio * pressure(1.0 / volume_ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+    g = phase.shear_modulus
+    m = g * (b[0] + b[1] + b[2]) / 3.0 + p
+    tau = wp.mat33(
+        g * b[0] - m,
+        g * s[0],
+        g * s[1],
+        g * s[0],
+        g * b[1] - m,
+        g * s[2],
+        g * s[1],
+        g * s[2],
+        g * b[2] - m,
+    )
+    if phase.viscosity > 0.0:
+        rate = 0.5 * (velocity_gradient + wp.transpose(velocity_gradient))
+        mean = wp.trace(rate) / 3.0
+        # A liquid that has cavitated (J > 1) must not break the bound on dt.
+        tau += (2.0 * wp.min(volume_ratio, 1.0) * phase.viscosity) * (rate - wp.diag(wp.vec3(mean, mean, mean)))
+    return tau
+
+
+@wp.func
+def inertia(mass: float, held: int):
+    """With which a particle takes part in the momentum of its nodes [kg]."""
+    return wp.where(held == CLAMPED, ANCHOR * mass, mass)
+
+
+@wp.func
+def strained(
+    grid: Grid,
+    dt: float,
+    phase: Phase,
+    p: int,
+    on: bool,
+    affine: wp.array(dtype=wp.mat33),
+    m: float,
+    volume: wp.array(dtype=float),
+    held: wp.array(dtype=int),
+    volume_ratio: wp.array(dtype=float),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+):
+    """Strain and stress of particle p in a step, kept if it is `on`; what it gives to a node one cell farther along
+    each axis beyond its momentum: the columns of (m C - 4 dt V0 tau / dx^2) dx [kg m/s] (Hu et al. 2018, eq. 18)."""
+    c = affine[p]
+    j = volume_ratio[p]
+    b = elastic_normal[p]
+    s = elastic_shear[p]
+    a = wp.mat33()
+    if held[p] == FREE:
+        a = m * c
+    if held[p] != CARRIED and on:
+        j *= wp.max(1.0 + dt * wp.trace(c), 0.1)
+        volume_ratio[p] = j
+        if phase.shear_modulus > 0.0:
+            b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
+                c[0, 0],
+                c[0, 1],
+                c[0, 2],
+                c[1, 0],
+                c[1, 1],
+                c[1, 2],
+                c[2, 0],
+                c[2, 1],
+                c[2, 2],
+                b[0],
+                b[1],
+                b[2],
+                s[0],
+                s[1],
+                s[2],
+                phase.shear_modulus,
+                phase.yield_stress,
+                phase.plastic_viscosity,
+                phase.flow_index,
+                phase.relaxation_rate,
+                dt,
+            )
+            b = wp.vec3(b_xx, b_yy, b_zz)
+            s = wp.vec3(b_xy, b_xz, b_yz)
+            elastic_normal[p] = b
+            elastic_shear[p] = s
+        a -= columns_scaled(kirchhoff(phase, j, b, s, c), (4.0 * dt * volume[p]) * wp.cw_mul(grid.inv_dx, grid.inv_dx))
+    return columns_scaled(a, grid.dx)
+
+
+@wp.func
+def contained(grid: Grid, x: wp.vec3):
+    """A position wrapped along periodic axes and kept in front of walls."""
+    out = x
+    for axis in range(3):
+        low, high = grid.lower[axis], grid.upper[axis]
+        if grid.wrap[axis] > 0:
+            if out[axis] < low:
+                out[axis] = out[axis] + (high - low)
+            elif out[axis] >= high:
+                out[axis] = out[axis] - (high - low)
+        else:
+            skin = 1.0e-3 * grid.dx[axis]
+            out[axis] = wp.clamp(out[axis], low + skin, high - skin)
+    return out
+
+
+@wp.struct
+class Feedback:
+    """How the density on the grid corrects the volume ratio that particles integrate, and so drifts."""
+
+    rate: float  # over the wave speed [1/m]
+    tolerance: float  # overlap that is left alone [-]
+
+
+@wp.func
+def taken(
+    p: int,
+    gathered: wp.vec3,
+    density: float,
+    phase: Phase,
+    dt: float,
+    feedback: Feedback,
+    held: wp.array(dtype=int),
+    velocity: wp.array(dtype=wp.vec3),
+    volume_ratio: wp.array(dtype=float),
+):
+    """Particle p takes the velocity that it gathered, if it is free, and corrects its volume where the grid is crowded;
+    returns the velocity that it moves with."""
+    v = gathered
+    if held[p] == FREE:
+        velocity[p] = v
+    else:
+        v = velocity[p]
+    j = volume_ratio[p]
+    crowding = j * density / phase.density - 1.0 - feedback.tolerance
+    if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
+        volume_ratio[p] = j * (1.0 - wp.min(dt * feedback.rate * phase.wave_speed * crowding, 0.1))
+    return v
+
+
+@wp.func
+def moved(
+    grid: Grid,
+    x: wp.vec3,
+    v: wp.vec3,
+    dt: float,
+    p: int,
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+    fault: wp.array(dtype=int),
+):
+    """Move particle p on from x, walls stop it; returns its lowest node then."""
+    free = x + dt * v
+    if too_fast(v, grid.top_speed):
+        raise_fault(fault, FAULT_ASTRAY)
+    y = contained(grid, free)
+    position[p] = y
+    for axis in range(3):
+        if y[axis] != free[axis] and grid.wrap[axis] == 0:
+            stopped = velocity[p]
+            stopped[axis] = 0.0
+            velocity[p] = stopped
+    return first_node(grid, y)
+
+
+@wp.func
+def affine_of(grid: Grid, sums: wp.mat44):
+    """The affine velocity field [1/s]: C = B D^-1, from B's transpose in rows 1 to 3, in cells."""
+    b = wp.mat33(
+        sums[1, 0],
+        sums[2, 0],
+        sums[3, 0],
+        sums[1, 1],
+        sums[2, 1],
+        sums[3, 1],
+        sums[1, 2],
+        sums[2, 2],
+        sums[3, 2],
+    )
+    return columns_scaled(b, 4.0 * grid.inv_dx)
