@@ -95,6 +95,7 @@ def relieve(
 
 @wp.kernel
 def harden(
+    share: wp.vec3i,
     elastic: int,
     capacity: int,
     count: wp.array(dtype=int),
@@ -106,7 +107,7 @@ def harden(
     elastic_shear: wp.array(dtype=wp.vec3),
 ):
     """Move particles to the phase they are due, for a method without a pressure law."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and due[i] != phase_of[i]:
         if elastic == 1:
@@ -116,6 +117,7 @@ def harden(
 
 @wp.kernel
 def harden_at_ratio(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     phases: wp.array2d(dtype=Phase),
@@ -128,7 +130,7 @@ def harden_at_ratio(
     elastic_shear: wp.array(dtype=wp.vec3),
 ):
     """The same for a method that integrates J: the present volume V0 J stays."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and due[i] != phase_of[i]:
         before, after = phases[world, phase_of[i]], phases[world, due[i]]
@@ -142,6 +144,7 @@ def harden_at_ratio(
 
 @wp.kernel
 def harden_at_density(
+    share: wp.vec3i,
     elastic: int,
     capacity: int,
     count: wp.array(dtype=int),
@@ -156,7 +159,7 @@ def harden_at_density(
     elastic_shear: wp.array(dtype=wp.vec3),
 ):
     """The same for a method that integrates density, which stays."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and due[i] != phase_of[i]:
         before, after = phases[world, phase_of[i]], phases[world, due[i]]

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import warp as wp
 
+from fluidbench.native.crew import put
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 from fluidbench.scenario.expansion import Expansion
@@ -90,7 +91,7 @@ class Neighbours:
 
     def refresh(self) -> None:
         """The pool was changed from outside: make the lists anew at the next substep."""
-        self.outdated.fill_(1)
+        self.scene.crew.launch(put, 1, [1, self.outdated])
 
     def update(self) -> None:
         """Enqueue the check of the lists and, on the device's own decision, their renewal."""

@@ -93,6 +93,10 @@ class Session(ABC):
     def look(self) -> Vital:
         """Read the vital signs, as they are now."""
 
+    def news(self) -> Vital:
+        """The latest vital signs that are there without waiting, which may be of an earlier time."""
+        return self.look()
+
     def conclude(self) -> str | None:
         """What is wrong with the state that the run ends with, if anything."""
         return self.look().complaint

@@ -20,7 +20,8 @@ PRESSED = 0.05  # energy of spawned children that lie over each other, over mass
 @dataclass(frozen=True)
 class Vital:
     """One reading: largest speed [m/s], energies [J], what is wrong, what there was no room for, and what the method
-    itself found broken, if anything."""
+    itself found broken, if anything; the time [s] that it is of, where that is not the present, and a native method's
+    fault bits."""
 
     speed: float
     kinetic: float
@@ -28,6 +29,8 @@ class Vital:
     complaint: str | None
     shortage: str | None = None
     broken: str | None = None
+    time: float | None = None
+    bits: int = 0
 
 
 def top_speed(scenario: Scenario, wave_speed: float) -> float:

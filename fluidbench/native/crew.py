@@ -57,6 +57,12 @@ def meet(gate: wp.array(dtype=int), threads: int, give_way: wp.uint64):
     wait_for_all(gate, threads, give_way)
 
 
+@wp.kernel
+def put(value: int, flag: wp.array(dtype=int)):
+    """flag[0] = value, in its turn among launches."""
+    flag[0] = value
+
+
 @wp.func_native(
     snippet="""
 #if defined(__CUDA_ARCH__)
@@ -117,6 +123,7 @@ class Crew:
     def __init__(self, device: wp.Device, threads: int = 1) -> None:
         self.device = device
         self.threads = threads if device.is_cpu else 1
+        self.graphs: dict[Any, list[Any]] = {}
         self._number, self._of = 0, 1  # the thread that is being recorded, and of how many
         if self.threads > 1:
             self._gate = wp.zeros(32, dtype=int, device=device)
@@ -124,23 +131,37 @@ class Crew:
             self._address = _give_way()
             wp.load_module(device=device)
 
+    @property
+    def leading(self) -> bool:
+        """Whether what is launched now is the part of the first thread."""
+        return self._number == 0
+
     def launch(
-        self, kernel: Any, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
+        self, kernel: Any, size: Any, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
     ) -> None:
         shared = kernel.adj.args[0].label == "share"
-        deal = DEAL if size % 2**DEAL == 0 and size >= 64 * 2**DEAL else 0
         if shared:
+            deal = DEAL if size % 2**DEAL == 0 and size >= 64 * 2**DEAL else 0
             turns = (size >> deal) + self._of - 1 - self._number
             size = (turns // self._of) << deal
             inputs = [wp.vec3i(self._number, self._of, deal), *inputs]
-        if size > 0 and (shared or self._number == 0):
+        if size and (shared or self._number == 0):
             launch = wp.launch if self._number == 0 else uncounted_launch
             launch(kernel, size, inputs, outputs, device=self.device, block_dim=block_dim)
         if self._of > 1:
             uncounted_launch(meet, 1, [self._gate, self._of, wp.uint64(self._address)], device=self.device)
 
-    def record(self, work: Callable[[], object]) -> list[Any]:
-        """Graphs of what `work` launches, one a thread."""
+    def run(self, key: Any, work: Callable[[], object]) -> None:
+        """Replay some work, recorded at the first time."""
+        self.replay([(self.recorded(key, work), 1)])
+
+    def recorded(self, key: Any, work: Callable[[], object]) -> list[Any]:
+        """The graphs of some work, one a thread."""
+        if key not in self.graphs:
+            self.graphs[key] = self._record(work)
+        return self.graphs[key]
+
+    def _record(self, work: Callable[[], object]) -> list[Any]:
         graphs = []
         try:
             self._of = self.threads
@@ -153,14 +174,16 @@ class Crew:
             self._number, self._of = 0, 1
         return graphs
 
-    def replay(self, graphs: Sequence[Any], times: int = 1) -> None:
-        """Launch what was recorded, so many times; on the CPU, it is done then."""
-        waiting = [self._others.submit(_replay, graph, times) for graph in graphs[1:]]
-        _replay(graphs[0], times)
+    def replay(self, parts: Sequence[tuple[Sequence[Any], int]]) -> None:
+        """Launch what was recorded, one part after the other, each so many times; on the CPU, it is done then."""
+        shares = [[(graphs[k], times) for graphs, times in parts] for k in range(self.threads)]
+        waiting = [self._others.submit(_replay, share) for share in shares[1:]]
+        _replay(shares[0])
         for future in waiting:
             future.result()
 
 
-def _replay(graph: Any, times: int) -> None:
-    for _ in range(times):
-        wp.capture_launch(graph)
+def _replay(share: Sequence[tuple[Any, int]]) -> None:
+    for graph, times in share:
+        for _ in range(times):
+            wp.capture_launch(graph)

@@ -5,6 +5,9 @@ floor (FAULT_STATE): a clamp is never all that stands between a blow-up and a re
 particles carry, once a tick; `read` reads what method/vitals.py judges.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import warp as wp
@@ -118,83 +121,155 @@ def audit(
         raise_fault(fault, wp.where(fields.holds[field] == PLACES, FAULT_ASTRAY, FAULT_STATE))
 
 
+SIGNS = 5  # numbers of a reading
+
+
+@wp.kernel
+def forget(top_speed: wp.array(dtype=float), nonfinite: wp.array(dtype=int), energy: wp.array2d(dtype=wp.float64)):
+    """Begin a reading."""
+    world = wp.tid()
+    top_speed[world] = 0.0
+    nonfinite[world] = 0
+    energy[world, 0] = wp.float64(0.0)
+    energy[world, 1] = wp.float64(0.0)
+
+
+@wp.kernel
+def sum_up(
+    top_speed: wp.array(dtype=float),
+    nonfinite: wp.array(dtype=int),
+    energy: wp.array2d(dtype=wp.float64),
+    fault: wp.array(dtype=int),
+    signs: wp.array(dtype=wp.float64),
+):
+    """One reading of all worlds: top speed, broken particles, kinetic and potential energy, fault bits."""
+    fastest, bad = float(0.0), int(0)
+    kinetic, potential = wp.float64(0.0), wp.float64(0.0)
+    for world in range(top_speed.shape[0]):
+        fastest = wp.max(fastest, top_speed[world])
+        bad += nonfinite[world]
+        kinetic += energy[world, 0]
+        potential += energy[world, 1]
+    signs[0] = wp.float64(fastest)
+    signs[1] = wp.float64(bad)
+    signs[2] = kinetic
+    signs[3] = potential
+    signs[4] = wp.float64(fault[0])
+
+
 class Health:
-    """Reads the pool's vital signs; `supplied` tracks the energy that bodies, nozzle and gravity brought in."""
+    """Reads the pool's vital signs, now or, from a GPU, while it goes on; makes sure that a pool holds only numbers."""
 
     def __init__(self, scene: Scene, pool: Pool) -> None:
-        self.scene, self.pool = scene, pool
-        self._audit: Any = None
+        self.scene, self.pool, self.fields = scene, pool, described(pool)
         self.lanes = min(scene.lanes, 4096)
         with wp.ScopedDevice(scene.device):
             self.top_speed = wp.zeros(pool.worlds, dtype=float)
             self.nonfinite = wp.zeros(pool.worlds, dtype=int)
             self.energy = wp.zeros((pool.worlds, 2), dtype=wp.float64)
+            self.signs = wp.zeros(SIGNS, dtype=wp.float64)
 
     def audit(self) -> None:
         """Enqueue the test of every field of the pool against its range; it marks the pool's fault bits."""
-        if self._audit is None:
-            pool, scene, self._fields = self.pool, self.scene, self._described()
-            with wp.ScopedCapture(device=scene.device) as capture:  # replayed: arguments cost more than the test itself
-                wp.launch(
-                    audit,
-                    (len(pool.fields), pool.worlds, self.lanes),
-                    [self.lanes, self._fields, scene.box, pool.capacity, pool.count],
-                    [pool.fault],
-                    device=scene.device,
-                )
-            self._audit = capture.graph
-        wp.capture_launch(self._audit)
+        pool, scene = self.pool, self.scene
+        scene.crew.launch(
+            audit,
+            (len(pool.fields), pool.worlds, self.lanes),
+            [self.lanes, self.fields, scene.box, pool.capacity, pool.count],
+            [pool.fault],
+        )
 
-    def _described(self) -> Fields:
-        """The pool's fields, all of which have been added by now."""
-        fields, pool = Fields(), self.pool
-        kinds = {name: WHOLE if array.dtype is wp.int32 else NUMBERS for name, array in pool.fields.items()}
-        kinds["position"] = PLACES
-        most = 2.0**31 - 256.0  # the largest float32 that is an int32
-        ranges = [
-            (max(low, -most), min(high, most)) if kinds[name] == WHOLE else (low, high)
-            for name, (low, high) in pool.ranges.items()
-        ]
-        with wp.ScopedDevice(self.scene.device):
-            fields.address = wp.array([array.ptr for array in pool.fields.values()], dtype=wp.uint64)
-            fields.holds = wp.array(list(kinds.values()), dtype=int)
-            sizes = [wp.types.type_size_in_bytes(array.dtype) // 4 for array in pool.fields.values()]
-            fields.width = wp.array(sizes, dtype=int)
-            fields.low = wp.array([low for low, _ in ranges], dtype=float)
-            fields.high = wp.array([high for _, high in ranges], dtype=float)
-        return fields
+    def inspect(self) -> None:
+        """Enqueue a reading of all worlds."""
+        pool, scene = self.pool, self.scene
+        sums = [self.top_speed, self.nonfinite, self.energy]
+        scene.crew.launch(forget, pool.worlds, sums)
+        scene.crew.launch(
+            inspect,
+            (pool.worlds, self.lanes),
+            [self.lanes, pool.capacity, pool.count, pool.position, pool.velocity, pool.mass, scene.force],
+            sums,
+        )
+        scene.crew.launch(sum_up, 1, [*sums, pool.fault, self.signs])
 
-    def broken(self) -> str | None:
-        """What a fault bit says of a run that has blown up; synchronises with the device."""
-        bits = int(self.pool.fault.numpy()[0])
+    def read(self) -> Vital:
+        """What is there now; waits for the device."""
+        self.scene.crew.run("inspect", self.inspect)
+        return self._vital(self.signs.numpy().tolist(), self.pool.counts)
+
+    def post(self, time: float) -> "Letter":
+        """A reading of what is there when the device gets to it, which will then be `time` [s]."""
+        self.scene.crew.run("inspect", self.inspect)
+        signs = wp.empty(SIGNS, dtype=wp.float64, device="cpu", pinned=True)
+        wp.copy(signs, self.signs)
+        return Letter(time, list(self.pool.counts), signs, wp.record_event(wp.Event(self.scene.device)))
+
+    def open(self, letter: "Letter") -> Vital:
+        """What it says, once it is here."""
+        return self._vital(letter.read(), letter.counts)
+
+    def broken(self, bits: int | None = None) -> str | None:
+        """What fault bits, by default those of the pool now, say of a run that has blown up."""
+        bits = int(self.pool.fault.numpy()[0]) if bits is None else bits
         if bits & FAULT_ASTRAY:
             return f"a particle was thrown out of the domain, or faster than {self.scene.top_speed:.3g} m/s"
         if bits & FAULT_STATE:
             return "a particle's state is not finite, or beyond that of any matter"
         return None
 
-    def read(self) -> Vital:
-        """Inspect all worlds; synchronises with the device."""
-        for array in (self.top_speed, self.nonfinite, self.energy):
-            array.zero_()
-        pool, scene = self.pool, self.scene
-        wp.launch(
-            inspect,
-            (pool.worlds, self.lanes),
-            [self.lanes, pool.capacity, pool.count, pool.position, pool.velocity, pool.mass, scene.force],
-            [self.top_speed, self.nonfinite, self.energy],
-            device=scene.device,
-        )
-        speed = float(self.top_speed.numpy().max())
-        kinetic, potential = self.energy.numpy().sum(axis=0)
-        broken = self.broken()
-        found = self._complaint(speed, float(kinetic), broken)
-        return Vital(speed, float(kinetic), float(potential), found, broken=broken)
+    def _vital(self, signs: Sequence[float], counts: Sequence[int]) -> Vital:
+        speed, bad, kinetic, potential, bits = signs
+        broken = self.broken(int(bits))
+        found = complaint(int(bad), speed, self.scene.top_speed, kinetic, self._supply(counts), broken)
+        return Vital(speed, kinetic, potential, found, broken=broken, bits=int(bits))
 
-    def _complaint(self, speed: float, kinetic: float, broken: str | None) -> str | None:
-        scene = self.scene
-        mass = sum(
-            n * s.material.density * s.spacing**3 for n, s in zip(self.pool.counts, scene.scenarios, strict=True)
-        )
-        supply = 2.0 * mass * mass_energy(scene.scenario, scene.top_wave_speed)
-        return complaint(int(self.nonfinite.numpy().sum()), speed, scene.top_speed, kinetic, supply, broken)
+    def _supply(self, counts: Sequence[int]) -> float:
+        """Energy that bodies, nozzle, gravity and expansion can have brought to so many particles a world [J]."""
+        scenarios = self.scene.scenarios
+        mass = sum(n * s.material.density * s.spacing**3 for n, s in zip(counts, scenarios, strict=True))
+        return 2.0 * mass * self._mass_energy
+
+    @cached_property
+    def _mass_energy(self) -> float:
+        return mass_energy(self.scene.scenario, self.scene.top_wave_speed)
+
+
+@dataclass
+class Letter:
+    """A reading on its way from a GPU, of a time [s] at which each world had so many particles."""
+
+    time: float
+    counts: list[int]
+    signs: Any
+    sent: Any = None
+
+    def read(self) -> list[float]:
+        """Its numbers; waits until they are here."""
+        if self.sent is not None:
+            wp.synchronize_event(self.sent)
+            self.signs, self.sent = self.signs.numpy().tolist(), None
+        return self.signs
+
+    def copy(self) -> dict[str, Any]:
+        """As JSON can hold it."""
+        return {"time": self.time, "counts": self.counts, "signs": self.read()}
+
+
+def described(pool: Pool) -> Fields:
+    """A pool's fields, all of which have been added by now, as memory."""
+    fields = Fields()
+    kinds = {name: WHOLE if array.dtype is wp.int32 else NUMBERS for name, array in pool.fields.items()}
+    kinds["position"] = PLACES
+    most = 2.0**31 - 256.0  # the largest float32 that is an int32
+    ranges = [
+        (max(low, -most), min(high, most)) if kinds[name] == WHOLE else (low, high)
+        for name, (low, high) in pool.ranges.items()
+    ]
+    with wp.ScopedDevice(pool.scene.device):
+        fields.address = wp.array([array.ptr for array in pool.fields.values()], dtype=wp.uint64)
+        fields.holds = wp.array(list(kinds.values()), dtype=int)
+        sizes = [wp.types.type_size_in_bytes(array.dtype) // 4 for array in pool.fields.values()]
+        fields.width = wp.array(sizes, dtype=int)
+        fields.low = wp.array([low for low, _ in ranges], dtype=float)
+        fields.high = wp.array([high for _, high in ranges], dtype=float)
+    return fields

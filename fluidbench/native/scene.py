@@ -13,6 +13,7 @@ from ..errors import UserError
 from ..method.vitals import top_speed
 from ..scenario import Friction, Scenario
 from ..scenario.material import Material
+from .clock import Clock
 from .crew import Crew
 from .device import quiet_warp
 
@@ -96,6 +97,7 @@ class Scene:
         self.scenario = self.scenarios[0]
         self.device = wp.get_device(device)
         self.crew = Crew(self.device, threads)
+        self.clock = Clock(self.scenario, self.crew)
         self.worlds = len(self.scenarios)
         self._check_worlds()
         self.spacing = self.scenario.spacing

@@ -18,9 +18,9 @@ from ..registry import get_method
 from ..scenario import Scenario
 from ..scenario.layout import capacity_of, emitted, generations
 from ..scenario.numerics import configure
-from . import health
+from . import clock, crew, health
 from .device import CountedLaunches
-from .health import Health, Vital
+from .health import Health, Letter, Vital
 from .pool import Pool
 from .process import contact, curing, emission, expansion
 from .process.contact import Contact
@@ -79,8 +79,10 @@ class Simulation(Session):
         self.aged = 0  # ticks that this process has run
         self._identity = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
         self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
-        self._graphs: dict[int, Any] = {}
-        self.substep_launches, self.process_launches = CountedLaunches(), CountedLaunches()
+        self._planned: tuple[Any, Plan] | None = None
+        self.posted: Letter | None = None  # a reading on its way from a GPU
+        self.heard = Vital(self.speed, 0.0, 0.0, None)
+        self.substep_launches = self.process_launches = 0  # of a substep; of the processes a tick, at most
         self._use_graphs = graphs and target.backend == DEFAULT_BACKEND
 
     @property
@@ -101,13 +103,15 @@ class Simulation(Session):
     def prepare(self) -> None:
         """Compile and load every kernel."""
         self.solver.prepare()
-        wp.load_module(health, device=self.scene.device)
+        for module in (clock, crew, health):
+            wp.load_module(module, device=self.scene.device)
         parts = {emission: self.emission, curing: self.curing, expansion: self.growing, contact: self.contact}
         for module in (module for module, part in parts.items() if part is not None):
             wp.load_module(module, device=self.scene.device)
 
     def begin(self) -> Vital:
-        self._age()
+        self.scene.clock.show(0)
+        self._age(self._expect())
         self._refresh()
         return self.look()
 
@@ -124,37 +128,88 @@ class Simulation(Session):
         return taken
 
     def advance_tick(self) -> Plan:
-        """One tick: feed, plan, and run its substeps."""
-        if self.unseen or self.scene.device.is_cpu:  # on a GPU what nobody has looked at since the last audit is ours
-            self.health.audit()
-            self.unseen = False
-        with self.process_launches:
-            self._age()
+        """One tick: feed, plan, and run its substeps. Nothing here waits for a GPU, but where matter gives birth."""
+        if not self.scene.device.is_cpu and self.done % LOOK_TICKS == 0:
+            self._exchange()
         if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
             self.reorder(keys)
-        self._refresh()
-        steps = plan(self.bounds(), self.tick)
+        self.scene.clock.show(self.done)
+        feeding = self._expect()
+        steps = self._plan()
         self.scene.set_dt(steps.dt)
-        self._run(steps.substeps)
+        self._run_tick(feeding, steps.substeps)
         self.done += 1
         self.aged += 1
         return steps
 
-    def _age(self) -> None:
-        """What happens to material whatever the method, at the start of a tick."""
+    def _expect(self) -> bool:
+        """What the host must know or do at the start of a tick; whether the nozzle holds anything to be moved."""
         self.placement.advance(self.now)
-        if self.emission is not None:
-            self.emission.advance(self.now, self.tick)
-        if self.growing is not None:
-            self.growing.advance(self.now, self.tick)
-        if self.curing is not None:
-            self.curing.advance(self.now)
-        if self.contact is not None:
-            self.contact.advance(self.now, self.tick)
+        return self.emission is not None and self.emission.expect(self.now)
+
+    def _plan(self) -> Plan:
+        """The substeps of the coming tick, planned anew where the speed or the materials are others."""
+        materials = (s for d in self._demands for s in d.until(self.now + self.tick))
+        key = (self.speed, *map(id, materials))
+        if self._planned is None or self._planned[0] != key:
+            self._planned = key, plan(self.bounds(), self.tick)
+        return self._planned[1]
+
+    def _run_tick(self, feeding: bool, substeps: int) -> None:
+        """The audit, what happens to the material, and the substeps: replayed, but the first time in a process and
+        where births need the host."""
+        on_cpu, births = self.scene.device.is_cpu, self.growing is not None and self.growing.births
+        audited, self.unseen = self.unseen or on_cpu, False  # on a GPU what nobody has looked at since is ours
+        if not self._use_graphs or self.aged == 0 or births:
+            if audited:
+                self._audit()
+            self._age(feeding)
+            self._refresh()
+            self._run(substeps)
+            return
+        (stale, self.pool.stale), clock = (self.pool.stale, False), self.scene.clock
+        if on_cpu:  # where replay is free
+            start = self.scene.crew.recorded(
+                (audited, feeding, stale), lambda: self._start_tick(audited, feeding, stale)
+            )
+            self.scene.crew.replay([(start, 1), (self.scene.crew.recorded(1, self._substep), substeps)])
+        else:
+            key = audited, feeding, stale, substeps
+            self.scene.crew.replay([(self.scene.crew.recorded(key, lambda: self._whole_tick(*key)), 1)])
+        clock.struck()
+
+    def _start_tick(self, audited: bool, feeding: bool, stale: bool) -> None:
+        """Enqueue all of a tick but its substeps."""
+        if audited:
+            self.health.audit()
+        self._age(feeding)
+        self.scene.clock.strike()
+        if stale:
+            self.solver.refresh()
+
+    def _whole_tick(self, audited: bool, feeding: bool, stale: bool, substeps: int) -> None:
+        self._start_tick(audited, feeding, stale)
+        for _ in range(substeps):
+            self._substep()
+
+    def _age(self, feeding: bool) -> None:
+        """What happens to material whatever the method, at the start of a tick."""
+        with CountedLaunches() as counted:
+            if self.emission is not None and feeding:
+                self.emission.feed()
+            if self.growing is not None:
+                self.growing.grow()
+                self.growing.give_birth(self.now)
+            if self.curing is not None:
+                self.curing.ripen()
+            if self.contact is not None:
+                self.contact.follow()
+        if self.scene.crew.leading:
+            self.process_launches = max(self.process_launches, counted.count)
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
-        self.health.audit()
+        self._audit()
         self._refresh()
         self.scene.set_dt(dt)
         self._run(substeps)
@@ -165,15 +220,39 @@ class Simulation(Session):
             self.solver.refresh()
             self.pool.stale = False
 
+    def _audit(self) -> None:
+        self.scene.crew.run("audit", self.health.audit)
+
     def look(self) -> Vital:
-        """Read the vital signs; synchronises with the device."""
-        vital, self.unseen = replace(self.health.read(), shortage=self.shortage()), True
-        self.speed = max(vital.speed, 0.1 * self.scenario.reference_speed)
+        vital = self._told(self.health.read(), self.now)
+        self.unseen = True
+        if self.scene.device.is_cpu or self.done == 0:
+            self._go_by(vital)
         return vital
+
+    def news(self) -> Vital:
+        return self.look() if self.scene.device.is_cpu else self.heard
+
+    def _go_by(self, vital: Vital) -> None:
+        """Plan for what was seen."""
+        self.heard, self.speed = vital, max(vital.speed, 0.1 * self.scenario.reference_speed)
+
+    def _exchange(self) -> None:
+        """On a GPU, which is not to wait for the host: send for what is there now, and go by what came of the last
+        time. When that is depends on the number of ticks alone, and so does every plan."""
+        if self.posted is not None:
+            self._go_by(self._told(self.health.open(self.posted), self.posted.time))
+        self.posted = self.health.post(self.now)
+        self.unseen = True
+
+    def _told(self, vital: Vital, time: float) -> Vital:
+        """With its time, and a shortage in the solver's words."""
+        words = [text for bit, text in self.solver.faults.items() if bit & vital.bits]
+        return replace(vital, time=time, shortage="; ".join(words) if words else None)
 
     def conclude(self) -> str | None:
         """What is carried to the end is tested like what is carried on."""
-        self.health.audit()
+        self._audit()
         return self.health.broken()
 
     def frame(self, world: int = 0) -> Frame:
@@ -208,31 +287,27 @@ class Simulation(Session):
 
     def _substep(self) -> None:
         """Everything of one substep, as it is captured."""
-        self.solver.substep()
-        if self.contact is not None:
-            self.contact.substep()
+        with CountedLaunches() as counted:
+            self.solver.substep()
+            if self.contact is not None:
+                self.contact.substep()
+        if self.scene.crew.leading:
+            self.substep_launches = counted.count
 
     def _run(self, substeps: int) -> None:
-        """Replay `substeps` substeps: one graph a substep on the CPU, where replay is free, one for all on CUDA."""
+        """Replay `substeps` substeps: one graph a substep on the CPU, one for all on CUDA."""
         if not self._use_graphs:
             self._launch(substeps)
             return
         each = 1 if self.scene.device.is_cpu else substeps
-        if each not in self._graphs:
-            self.substep_launches = CountedLaunches()
-            with self.substep_launches:
-                self._graphs[each] = self.scene.crew.record(lambda: [self._substep() for _ in range(each)])
-            self.substep_launches.count //= each
-        self.scene.crew.replay(self._graphs[each], substeps // each)
+        graphs = self.scene.crew.recorded(each, lambda: [self._substep() for _ in range(each)])
+        self.scene.crew.replay([(graphs, substeps // each)])
 
     def _launch(self, substeps: int) -> None:
         """Launch `substeps` substeps one by one, between those of Warp that came before and come after."""
         self._wait()
-        self.substep_launches = CountedLaunches()
-        with self.substep_launches:
-            for _ in range(substeps):
-                self._substep()
-        self.substep_launches.count //= substeps
+        for _ in range(substeps):
+            self._substep()
         self._wait()
 
     def _wait(self) -> None:
@@ -264,19 +339,12 @@ class Simulation(Session):
         return found
 
     def statistics(self) -> dict[str, Any]:
-        """Launches of kernels: of a substep, and of the processes a tick."""
-        process = self.process_launches.count / max(self.aged, 1)
-        return {"launches": {"per_substep": self.substep_launches.count, "process_per_tick": process}}
+        """Launches of kernels: of a substep, and of the processes a tick, at most."""
+        return {"launches": {"per_substep": self.substep_launches, "process_per_tick": self.process_launches}}
 
     def peak_device_bytes(self) -> int | None:
         device = self.scene.device
         return None if device.is_cpu else wp.get_mempool_used_mem_high(device)
-
-    def shortage(self) -> str | None:
-        """What a kernel had no room for, in the solver's words."""
-        bits = int(self.pool.fault.numpy()[0])
-        words = [text for bit, text in self.solver.faults.items() if bits & bit]
-        return "; ".join(words) if words else None
 
     def arrays(self) -> dict[str, wp.array]:
         """Everything on the device that a run must have to go on as it was."""
@@ -291,6 +359,7 @@ class Simulation(Session):
             "counts": self.pool.counts,
             "stale": bool(self.pool.stale),
             "placement": self.placement.progress(),
+            "posted": None if self.posted is None else self.posted.copy(),
         }
         progress |= {"emission": self.emission.progress()} if self.emission is not None else {}
         return progress, {name: array.numpy() for name, array in self.arrays().items()}
@@ -301,6 +370,7 @@ class Simulation(Session):
         self.done, self.speed = progress["done"], progress["speed"]
         self.pool.counts, self.pool.stale = list(progress["counts"]), progress["stale"]
         self.placement.go_on(progress["placement"])
+        self.posted = None if progress["posted"] is None else Letter(**progress["posted"])
         if self.emission is not None:
             self.emission.go_on(progress["emission"])
         self.solver.resume()

@@ -49,8 +49,9 @@ class Outcome:
         for name, held in steps.binding.items():
             self.binding[name] = self.binding.get(name, 0.0) + held
 
-    def end(self, verdict: Verdict, reason: str) -> None:
-        self.verdict, self.reason = verdict, reason
+    def end(self, verdict: Verdict, reason: str, time: float) -> None:
+        """That was at `time` [s]."""
+        self.verdict, self.reason, self.time = verdict, reason, time
 
 
 @dataclass
@@ -85,16 +86,17 @@ class Drive:
             self.leg()
             if self.checkpoints is not None and self.checkpoints.due() and outcome.verdict is Verdict.COMPLETED:
                 self.checkpoints.write(outcome)
-        outcome.time = session.now
-        if outcome.verdict is Verdict.COMPLETED and (broken := session.conclude()):
-            outcome.end(Verdict.DIVERGED, f"at t = {session.now:.4g} s {broken}")
+        if outcome.verdict is Verdict.COMPLETED:
+            outcome.time = session.now
+            if broken := session.conclude():
+                outcome.end(Verdict.DIVERGED, f"at t = {session.now:.4g} s {broken}", session.now)
         return outcome
 
     def begin(self) -> None:
         try:
             vital = self.session.begin()
         except OutOfCapacity as error:
-            self.outcome.end(Verdict.OUT_OF_CAPACITY, str(error))
+            self.outcome.end(Verdict.OUT_OF_CAPACITY, str(error), self.session.now)
             return
         if self.observe is not None:
             self.observe(self.session, vital)
@@ -110,30 +112,32 @@ class Drive:
         try:
             steps = session.advance(until)
         except OutOfCapacity as error:
-            outcome.end(Verdict.OUT_OF_CAPACITY, str(error))
+            outcome.end(Verdict.OUT_OF_CAPACITY, str(error), session.now)
             return
-        vital = session.look()
+        at_output = session.now >= output - self.near
+        vital = session.look() if at_output else session.news()
         if self.camera is not None and session.now >= self.camera.next - self.near:
             self.camera.shoot(session)
         outcome.wall += time.perf_counter() - wall
         outcome.cpu += time.process_time() - cpu
         outcome.add(steps)
-        self.judge(vital, session.now >= output - self.near)
+        self.judge(vital, at_output)
 
     def judge(self, vital: Vital, at_output: bool) -> None:
         """End the run for what its vital signs, or its clock, say; otherwise observe what is to be observed."""
         session, outcome = self.session, self.outcome
+        time = session.now if vital.time is None else vital.time
         if vital.complaint:
-            outcome.end(Verdict.DIVERGED, f"at t = {session.now:.4g} s {vital.complaint}")
+            outcome.end(Verdict.DIVERGED, f"at t = {time:.4g} s {vital.complaint}", time)
         elif vital.shortage:
-            outcome.end(Verdict.OUT_OF_CAPACITY, f"at t = {session.now:.4g} s {vital.shortage}")
+            outcome.end(Verdict.OUT_OF_CAPACITY, f"at t = {time:.4g} s {vital.shortage}", time)
         else:
             if self.observe is not None and at_output:
                 self.observe(session, vital)
             if late := self.too_slow():
                 if self.checkpoints is not None and self.checkpoints.every > 0:
                     self.checkpoints.write(outcome)  # with a larger limit it goes on from here
-                outcome.end(Verdict.TIMEOUT, late)
+                outcome.end(Verdict.TIMEOUT, late, session.now)
 
     def too_slow(self) -> str | None:
         """Over the wall limit, or certain to be: the pace only falls as particles are added."""

@@ -5,6 +5,7 @@ A column of discs one spacing apart; each disc carries exactly the nozzle's area
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -74,11 +75,11 @@ class Stream:
     def particles(self) -> int:
         return len(self.offsets) * len(self.extruding)
 
-    def entered(self, time: float) -> int:
-        """How many discs are in the nozzle or beyond at `time`."""
+    def entered(self, time) -> Any:
+        """How many discs are in the nozzle or beyond at `time` [s], a number or an array."""
         assert self.scenario.nozzle is not None and self.scenario.track is not None
         ahead = (COLUMN + 0.5) * self.scenario.spacing / self.scenario.nozzle.speed
-        return int(np.searchsorted(self.extruding, self.scenario.track.extruded(time) + ahead))
+        return np.searchsorted(self.extruding, self.scenario.track.extruded(time) + ahead)
 
     def released(self, time: float) -> int:
         """How many discs have left the nozzle at `time`."""

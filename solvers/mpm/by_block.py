@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from fluidbench.method.frame import CARRIED
-from fluidbench.native.crew import drawn, index_of
+from fluidbench.native.crew import drawn, index_of, put
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Phase, Scene
 
@@ -301,7 +301,7 @@ class ByBlock:
             kernel.module.load(self.scene.device)
 
     def refresh(self) -> None:
-        self.homes.outdated.fill_(1)
+        self.launch(put, 1, [1, self.homes.outdated])
 
     def p2g(self, grid: Grid, table: wp.array, block_of: wp.array, active: wp.array, sums: list[wp.array]) -> None:
         """Find homes anew where particles have moved to others; then scatter, and add up to `sums` (raw, fill)."""

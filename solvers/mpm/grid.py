@@ -216,6 +216,7 @@ def reset_blocks(table: wp.array(dtype=int), block_of: wp.array(dtype=int), acti
 
 @wp.kernel
 def find_blocks(
+    share: wp.vec3i,
     grid: Grid,
     capacity: int,
     count: wp.array(dtype=int),
@@ -227,7 +228,7 @@ def find_blocks(
     fault: wp.array(dtype=int),
 ):
     """Activate the blocks around every particle."""
-    p = wp.tid()
+    p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
         activate_stencil(grid, world, first_node(grid, position[p]), table, block_of, active, fault)

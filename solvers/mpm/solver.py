@@ -12,6 +12,7 @@ from fluidbench.method.contract import Config, Economy, NumericalAxis
 from fluidbench.method.features import Feature
 from fluidbench.method.target import BACKENDS
 from fluidbench.method.timestep import Bound, damped_limit
+from fluidbench.native.crew import put
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 from fluidbench.native.solver import Solver
@@ -150,9 +151,9 @@ class SolverMPM(Solver):
         return kernels.passes(self.scene.expands)
 
     def refresh(self) -> None:
-        pool = self.pool
+        pool, scene = self.pool, self.scene
         self._launch("reset_blocks", self.node_lanes, [self.table, self.block_of, self.active, self.node_lanes])
-        self.active.zero_()
+        scene.crew.launch(put, 1, [0, self.active])
         self._launch(
             "find_blocks",
             pool.size,
@@ -196,12 +197,11 @@ class SolverMPM(Solver):
 
     def harden(self, due: wp.array) -> None:
         pool = self.pool
-        wp.launch(
+        self.scene.crew.launch(
             aging.harden_at_ratio,
             pool.size,
             [pool.capacity, pool.count, self.scene.phases, due],
             [pool.phase, pool.volume, pool.volume_ratio, pool.elastic_normal, pool.elastic_shear],
-            device=self.scene.device,
         )
 
     def clear_grid(self) -> None:

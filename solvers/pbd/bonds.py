@@ -216,6 +216,7 @@ def stretch(
 
 @wp.kernel
 def relieve(
+    share: wp.vec3i,
     capacity: int,
     count: wp.array(dtype=int),
     box: Box,
@@ -226,7 +227,7 @@ def relieve(
     bonds: Bonds,
 ):
     """Bonds of what stiffens keep their force: the rest length moves towards the present one as k / k'."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world]:
         for k in range(bonds.number[i]):
@@ -325,11 +326,10 @@ class Network:
 
     def relieve(self, due: wp.array) -> None:
         pool, scene = self.pool, self.scene
-        wp.launch(
+        scene.crew.launch(
             relieve,
             pool.size,
             [pool.capacity, pool.count, scene.box, scene.phases, pool.phase, due, pool.position, self.bonds],
-            device=scene.device,
         )
 
     def flow(self) -> None:

@@ -253,12 +253,11 @@ class SolverPBD(Solver):
         tensor = [pool.elastic_normal, pool.elastic_shear] if flowing else [self.motion, self.motion]
         if self.network is not None:
             self.network.relieve(due)
-        wp.launch(
+        self.scene.crew.launch(
             aging.harden,
             pool.size,
             [int(flowing), *self._active(), self.scene.phases, due],
             [pool.phase, *tensor],
-            device=self.scene.device,
         )
 
     def predict(self) -> None:

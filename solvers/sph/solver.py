@@ -220,12 +220,11 @@ class SolverSPH(Solver):
     def harden(self, due: wp.array) -> None:
         pool, elastic = self.pool, self.scene.elastic
         tensor = [pool.elastic_normal, pool.elastic_shear] if elastic else [self.unused, self.unused]
-        wp.launch(
+        self.scene.crew.launch(
             aging.harden_at_density,
             pool.size,
             [int(elastic), pool.capacity, pool.count, self.scene.phases, due, pool.mass, pool.density],
             [pool.phase, pool.volume, *tensor],
-            device=self.scene.device,
         )
 
     def lists(self) -> None:

@@ -12,6 +12,8 @@ from solvers import aging
 
 from ..conftest import scenario
 
+launch = Crew(wp.get_device("cpu")).launch
+
 FRESH = {"density": 1000.0, "youngs_modulus": 2.6e4, "poisson_ratio": 0.3, "yield_stress": 9e3}
 HARD = {"youngs_modulus": 10.4e4}
 G, K = 1e4, 2.6e4 / 1.2
@@ -48,7 +50,7 @@ class Two:
 @pytest.mark.parametrize("elastic", [0, 1])
 def test_shear_stress_carries_over(elastic):
     two = Two()
-    wp.launch(aging.harden, 3, [elastic, 3, two.count, two.phases, two.due], [two.phase, two.normal, two.shear])
+    launch(aging.harden, 3, [elastic, 3, two.count, two.phases, two.due], [two.phase, two.normal, two.shear])
     two.check(relieved=elastic == 1)
 
 
@@ -56,7 +58,7 @@ def test_shear_stress_carries_over(elastic):
 def test_pressure_and_present_volume_carry_over_where_j_is_integrated(ratio):
     """K (1 / J - 1) stays, with K fourfold; V0 J stays."""
     two = Two(ratio=ratio)
-    wp.launch(
+    launch(
         aging.harden_at_ratio,
         3,
         [3, two.count, two.phases, two.due],
@@ -73,7 +75,7 @@ def test_pressure_and_present_volume_carry_over_where_j_is_integrated(ratio):
 def test_pressure_carries_over_where_density_is_integrated(density):
     """K (rho / rho0 - 1) stays, with K fourfold and rho as it is: rho0 = m / V changes."""
     two = Two(density=density)
-    wp.launch(
+    launch(
         aging.harden_at_density,
         3,
         [1, 3, two.count, two.phases, two.due, two.mass, two.density],
@@ -87,7 +89,6 @@ def test_pressure_carries_over_where_density_is_integrated(density):
 
 def test_rest_volumes_grow_by_their_rate():
     """exp(rate dt); what integrates J keeps V0 J."""
-    launch = Crew(wp.get_device("cpu")).launch
     count, dt, growth = wp.array([2], dtype=int), numbers(0.25), numbers(2.0, 0.0, 2.0)
     volume, ratio = numbers(3.0, 3.0, 3.0), numbers(0.9, 0.9, 0.9)
     launch(aging.swell, 3, [3, count, dt, growth], [volume])

@@ -14,7 +14,7 @@ from solvers.pbd.laws import bond_stiffness
 
 from ..conftest import scenario
 
-LAUNCH = Crew(wp.get_device("cpu")).launch
+launch = Crew(wp.get_device("cpu")).launch
 
 E, E2, D, MASS = 1e4, 4e4, 0.01, 1e-3
 SOLID = {"density": 1000.0, "youngs_modulus": E, "poisson_ratio": 0.25}
@@ -42,7 +42,7 @@ class Pair:
         return self.bonds.rest.numpy().tolist()
 
     def harden(self, *due):
-        wp.launch(
+        launch(
             bonds.relieve,
             2,
             [2, self.count, self.box, self.table, self.phase, wp.array(due, dtype=int), self.position, self.bonds],
@@ -50,12 +50,12 @@ class Pair:
         return self.rest()
 
     def flow(self):
-        LAUNCH(bonds.yield_bonds, 2, [2, self.count, self.box, self.table, self.phase, self.position, self.bonds])
+        launch(bonds.yield_bonds, 2, [2, self.count, self.box, self.table, self.phase, self.position, self.bonds])
         return self.rest()
 
     def stretch(self, sweep=0):
         correction = wp.zeros(2, dtype=wp.vec3)
-        LAUNCH(
+        launch(
             bonds.stretch,
             2,
             [

@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from ...method.frame import FREE
+from ..clock import Hours
 from ..crew import index_of
 from ..pool import Pool
 from ..scene import Scene
@@ -90,6 +91,15 @@ def collide(
 
 
 @wp.kernel
+def pose(hours: Hours, parts: Parts):
+    """The collider goes with the nozzle."""
+    row = hours.row[0]
+    parts.exit[0] = hours.exit[row]
+    parts.velocity[0] = hours.drift[row]
+    parts.elapsed[0] = 0.0
+
+
+@wp.kernel
 def pass_time(dt: wp.array(dtype=float), elapsed: wp.array(dtype=float)):
     """The collider moves on by a substep."""
     elapsed[0] = elapsed[0] + dt[0]
@@ -114,14 +124,14 @@ class Contact:
             self.parts.exit, self.parts.velocity = wp.zeros(1, dtype=wp.vec3), wp.zeros(1, dtype=wp.vec3)
             self.parts.elapsed = wp.zeros(1, dtype=float)
 
+    def follow(self) -> None:
+        """Enqueue: put it where the nozzle is, moving to where it will be a tick later."""
+        self.scene.crew.launch(pose, 1, [self.scene.clock.hours, self.parts])
+
     def advance(self, now: float, tick: float) -> None:
-        """Put it where the nozzle is at `now` [s], moving to where it will be a tick later."""
-        track = self.scene.scenario.track
-        assert track is not None
-        here, there = track.at(now), track.at(now + tick)
-        self.parts.exit.assign(here[None, :].astype(np.float32))
-        self.parts.velocity.assign(((there - here) / tick)[None, :].astype(np.float32))
-        self.parts.elapsed.zero_()
+        """The same at any time `now` [s], for a tick of any length [s]."""
+        self.scene.clock.set(now, tick)
+        self.follow()
 
     def substep(self) -> None:
         """Enqueue the contact of one substep; captured with the solver's own."""

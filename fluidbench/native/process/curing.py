@@ -11,6 +11,8 @@ import numpy as np
 import warp as wp
 
 from ...method.frame import CARRIED
+from ..clock import Hours
+from ..crew import index_of
 from ..pool import Pool
 from ..scene import Scene
 from .chance import Chance, chance_of, uniform
@@ -20,7 +22,8 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 def due_levels(
-    now: float,
+    share: wp.vec3i,
+    hours: Hours,
     jitter: float,
     chance: Chance,
     level_ages: wp.array(dtype=float),
@@ -34,11 +37,11 @@ def due_levels(
     due: wp.array(dtype=int),
 ):
     """The level that each particle is due at its age; it never goes back."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
     if i % capacity < count[i / capacity]:
         level = phase[i]
         if held[i] != CARRIED:
-            age = now - birth_time[i] + jitter * (2.0 * uniform(chance, origin[i], 0, 0) - 1.0)
+            age = hours.time[hours.row[0]] - birth_time[i] + jitter * (2.0 * uniform(chance, origin[i], 0, 0) - 1.0)
             while level < level_ages.shape[0] and level_ages[level] <= age:
                 level += 1
         due[i] = level
@@ -57,14 +60,14 @@ class Curing:
             self.level_ages = wp.array(ages, dtype=float)
             self.due = wp.zeros(pool.size, dtype=int)
 
-    def advance(self, now: float) -> None:
-        """Bring every particle to the level of its age at `now` [s]."""
-        pool = self.pool
-        wp.launch(
+    def ripen(self) -> None:
+        """Enqueue: every particle to the level of its age at the hour of the clock."""
+        pool, scene = self.pool, self.scene
+        scene.crew.launch(
             due_levels,
             pool.size,
             [
-                now,
+                scene.clock.hours,
                 self.jitter,
                 self.chance,
                 self.level_ages,
@@ -76,9 +79,13 @@ class Curing:
                 pool.phase,
             ],
             [self.due],
-            device=self.scene.device,
         )
         self.harden(self.due)
+
+    def advance(self, now: float) -> None:
+        """The same at any time `now` [s]."""
+        self.scene.clock.set(now, self.scene.clock.tick)
+        self.ripen()
 
     def footprint(self) -> dict[str, int]:
         return {name: getattr(self, name).capacity for name in ("level_ages", "due")}

@@ -10,7 +10,8 @@ import numpy as np
 import warp as wp
 
 from ...method.frame import CARRIED, FREE
-from ...scenario.stream import Stream
+from ..clock import Hours
+from ..crew import index_of
 from ..pool import Pool
 from ..scene import Scene
 
@@ -33,19 +34,19 @@ class Pipe:
 
 
 @wp.func
-def inside_nozzle(pipe: Pipe, number: int, exit_point: wp.vec3, extruded: float):
-    """Where particle `number` of the stream is while the nozzle exit is at `exit_point`."""
+def inside_nozzle(pipe: Pipe, number: int, hours: Hours, row: int):
+    """Where particle `number` of the stream is at the hour of a row."""
     offset = pipe.offsets[number % pipe.points]
-    rise = pipe.exit_speed * (pipe.extruding[number / pipe.points] - extruded)
-    return exit_point + wp.vec3(offset[0], offset[1], rise)
+    rise = pipe.exit_speed * (pipe.extruding[number / pipe.points] - hours.extruded[row])
+    return hours.exit[row] + wp.vec3(offset[0], offset[1], rise)
 
 
 @wp.kernel
 def insert(
+    lanes: int,
+    hours: Hours,
     pipe: Pipe,
-    first: int,
-    exit_point: wp.vec3,
-    extruded: float,
+    inserted: wp.array(dtype=int),
     densities: wp.array2d(dtype=float),
     capacity: int,
     count: wp.array(dtype=int),
@@ -57,25 +58,36 @@ def insert(
     birth_time: wp.array(dtype=float),
     origin: wp.array(dtype=int),
 ):
-    """Put the stream's particles first, first + 1, ... into the nozzle of each world."""
-    world, i = wp.tid()
-    number = first + i
-    slot = world * capacity + count[world] + i
-    position[slot] = inside_nozzle(pipe, number, exit_point, extruded)
-    volume[slot] = pipe.volume
-    mass[slot] = pipe.volume * densities[world, 0]
-    held[slot] = CARRIED
-    birth_time[slot] = pipe.release_time[number / pipe.points]
-    origin[slot] = pipe.first_origin + number
+    """Put what the stream feeds now into the nozzle of each world, behind all that is there."""
+    world, lane = wp.tid()
+    row = hours.row[0]
+    number = inserted[0] + lane
+    slot = world * capacity + count[world] + lane
+    while number < hours.entered[row]:
+        position[slot] = inside_nozzle(pipe, number, hours, row)
+        volume[slot] = pipe.volume
+        mass[slot] = pipe.volume * densities[world, 0]
+        held[slot] = CARRIED
+        birth_time[slot] = pipe.release_time[number / pipe.points]
+        origin[slot] = pipe.first_origin + number
+        number += lanes
+        slot += lanes
+
+
+@wp.kernel
+def admit(hours: Hours, inserted: wp.array(dtype=int), count: wp.array(dtype=int)):
+    """What was put in counts from now on."""
+    entered = hours.entered[hours.row[0]]
+    for world in range(count.shape[0]):
+        count[world] = count[world] + wp.max(entered - inserted[0], 0)
+    inserted[0] = wp.max(entered, inserted[0])
 
 
 @wp.kernel
 def push(
+    share: wp.vec3i,
+    hours: Hours,
     pipe: Pipe,
-    now: float,
-    tick: float,
-    next_exit: wp.vec3,
-    next_extruded: float,
     capacity: int,
     count: wp.array(dtype=int),
     origin: wp.array(dtype=int),
@@ -85,28 +97,29 @@ def push(
     held: wp.array(dtype=int),
 ):
     """Release the particles whose time has come and move the others on to their place at the next tick."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
+    row = hours.row[0]
     if i % capacity < count[i / capacity] and held[i] == CARRIED:
         number = origin[i] - pipe.first_origin
         layer = number / pipe.points
         offset = pipe.offsets[number % pipe.points]
-        late = now - pipe.release_time[layer]
+        late = hours.time[row] - pipe.release_time[layer]
         if late >= 0.0:
             held[i] = FREE
             velocity[i] = pipe.release_velocity[layer]
             position[i] = pipe.release_point[layer] + wp.vec3(offset[0], offset[1], 0.0) + late * velocity[i]
         else:
-            velocity[i] = (inside_nozzle(pipe, number, next_exit, next_extruded) - position[i]) / tick
+            velocity[i] = (inside_nozzle(pipe, number, hours, row + 1) - position[i]) / hours.tick
 
 
 class Emission:
     """Feeds the pool from a scenario's nozzle, once a tick."""
 
     def __init__(self, scene: Scene, pool: Pool) -> None:
-        self.scene, self.pool, self.stream = scene, pool, Stream(scene.scenario)
+        stream, track, nozzle = scene.clock.stream, scene.scenario.track, scene.scenario.nozzle
+        assert track is not None and nozzle is not None and stream is not None
+        self.scene, self.pool, self.stream = scene, pool, stream
         self.inserted = self.released = 0
-        stream, track, nozzle = self.stream, scene.scenario.track, scene.scenario.nozzle
-        assert track is not None and nozzle is not None
         self.pipe = Pipe()
         self.pipe.first_origin, self.pipe.points = pool.counts[0], len(stream.offsets)
         self.pipe.exit_speed, self.pipe.volume = nozzle.speed, stream.volume
@@ -120,7 +133,9 @@ class Emission:
         for name, (values, dtype) in columns.items():
             setattr(self.pipe, name, wp.array(np.asarray(values, np.float32), dtype=dtype, device=scene.device))
         densities = [[s.material.density] for s in scene.scenarios]
-        self.densities = wp.array(densities, dtype=float, ndim=2, device=scene.device)
+        with wp.ScopedDevice(scene.device):
+            self.densities = wp.array(densities, dtype=float, ndim=2)
+            self._inserted = wp.zeros(1, dtype=int)
 
     def progress(self) -> list[int]:
         """How many particles are in the nozzle or beyond, and how many discs have left it."""
@@ -129,50 +144,42 @@ class Emission:
     def go_on(self, progress: list[int]) -> None:
         """From where another one came to."""
         self.inserted, self.released = progress
+        self._inserted.fill_(self.inserted)
 
-    def advance(self, now: float, tick: float) -> None:
-        """Bring the nozzle's content to time `now` [s] and set it moving towards its place one tick later."""
-        pool, stream, track = self.pool, self.stream, self.scene.scenario.track
-        assert track is not None
-        fresh = stream.entered(now) * len(stream.offsets) - self.inserted
+    def expect(self, now: float) -> bool:
+        """What will be fed at `now` [s], as far as the host must know it; whether the nozzle still holds anything that
+        is to be moved. Raises OutOfCapacity."""
+        pool, stream = self.pool, self.stream
+        fresh = int(stream.entered(now)) * len(stream.offsets) - self.inserted
         if fresh > 0:
             for world in range(pool.worlds):
                 pool.need(world, fresh)
-            wp.launch(
-                insert,
-                (pool.worlds, fresh),
-                [
-                    self.pipe,
-                    self.inserted,
-                    wp.vec3(*track.at(now)),
-                    float(track.extruded(now)),
-                    self.densities,
-                    pool.capacity,
-                    pool.count,
-                ],
-                [pool.position, pool.mass, pool.volume, pool.held, pool.birth_time, pool.origin],
-                device=self.scene.device,
-            )
+                pool.counts[world] += fresh
             self.inserted += fresh
-            for world in range(pool.worlds):
-                pool.set_count(world, pool.counts[world] + fresh)
-        gone = stream.released(now)
-        pool.stale |= gone > self.released
-        if self.released < len(stream.extruding):
-            self.released = gone
-            wp.launch(
-                push,
-                pool.size,
-                [
-                    self.pipe,
-                    now,
-                    tick,
-                    wp.vec3(*track.at(now + tick)),
-                    float(track.extruded(now + tick)),
-                    pool.capacity,
-                    pool.count,
-                    pool.origin,
-                ],
-                [pool.position, pool.velocity, pool.held],
-                device=self.scene.device,
-            )
+        before, self.released = self.released, stream.released(now)
+        pool.stale |= fresh > 0 or self.released > before
+        return before < len(stream.extruding)
+
+    def feed(self) -> None:
+        """Enqueue what the hour of the clock brings: insert, release, and move what is in the nozzle on its way to its
+        place one tick later."""
+        pool, launch, hours, lanes = self.pool, self.scene.crew.launch, self.scene.clock.hours, self.pipe.points
+        launch(
+            insert,
+            (pool.worlds, lanes),
+            [lanes, hours, self.pipe, self._inserted, self.densities, pool.capacity, pool.count],
+            [pool.position, pool.mass, pool.volume, pool.held, pool.birth_time, pool.origin],
+        )
+        launch(admit, 1, [hours, self._inserted, pool.count])
+        launch(
+            push,
+            pool.size,
+            [hours, self.pipe, pool.capacity, pool.count, pool.origin],
+            [pool.position, pool.velocity, pool.held],
+        )
+
+    def advance(self, now: float, tick: float) -> None:
+        """All of it at any time `now` [s], for a tick of any length [s]."""
+        self.scene.clock.set(now, tick)
+        if self.expect(now):
+            self.feed()

@@ -13,6 +13,8 @@ import warp as wp
 
 from ...method.frame import CARRIED
 from ...scenario.expansion import LARGEST, Expansion
+from ..clock import Hours
+from ..crew import index_of
 from ..pool import Pool
 from ..scene import PERIODIC, Box, Scene
 from .chance import Chance, chance_of, direction, uniform
@@ -46,8 +48,8 @@ class BirthLaw:
 
 @wp.kernel
 def growth_rates(
-    now: float,
-    tick: float,
+    share: wp.vec3i,
+    hours: Hours,
     ratio: float,
     delay: float,
     jitter: float,
@@ -63,7 +65,8 @@ def growth_rates(
     growth: wp.array(dtype=float),
 ):
     """Mean of d ln R / dt [1/s] over the coming tick; children keep their ancestor's clock."""
-    i = wp.tid()
+    i = index_of(share, wp.tid())
+    now, tick = hours.time[hours.row[0]], hours.tick
     if i % capacity < count[i / capacity]:
         rate = float(0.0)
         if held[i] != CARRIED:
@@ -262,16 +265,15 @@ class Growing:
         law.margin, law.first_range = model.margin * d, self.ancestors
         return law
 
-    def advance(self, now: float, tick: float) -> None:
-        """Rates for the coming tick, and the children that are due at `now` [s]."""
+    def grow(self) -> None:
+        """Enqueue the rates for the tick that begins at the hour of the clock."""
         pool, model = self.pool, self.model
         if model.kind == "growth":
-            wp.launch(
+            self.scene.crew.launch(
                 growth_rates,
                 pool.size,
                 [
-                    now,
-                    tick,
+                    self.scene.clock.hours,
                     model.ratio,
                     model.delay,
                     model.jitter,
@@ -285,12 +287,18 @@ class Growing:
                     pool.origin,
                 ],
                 [pool.growth],
-                device=self.scene.device,
             )
-        if self.births:
-            self._give_birth(now)
 
-    def _give_birth(self, now: float) -> None:
+    def advance(self, now: float, tick: float) -> None:
+        """Rates for a tick of any length [s] from `now` [s], and the children that are due then."""
+        self.scene.clock.set(now, tick)
+        self.grow()
+        self.give_birth(now)
+
+    def give_birth(self, now: float) -> None:
+        """The children that are due at `now` [s]: how many decides the device, so that the host must wait for it."""
+        if not self.births:
+            return
         pool, device = self.pool, self.scene.device
         self.born.zero_()
         wp.launch(
