@@ -3,6 +3,7 @@
 import numpy as np
 import warp as wp
 
+from fluidbench.native.crew import index_of
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 
@@ -11,6 +12,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 def cell_keys(
+    share: wp.vec3i,
     lower: wp.vec3,
     inv_cell: wp.vec3,
     cells: wp.vec3i,
@@ -20,7 +22,7 @@ def cell_keys(
     keys: wp.array(dtype=wp.int64),
 ):
     """World, then blocks of 4 x 4 x 4 cells, then cells; unused slots come last within their world."""
-    p = wp.tid()
+    p = index_of(share, wp.tid())
     world = p / capacity
     per_world = wp.int64(cells[0]) * wp.int64(cells[1]) * wp.int64(cells[2]) * wp.int64(64)
     key = per_world
@@ -49,7 +51,7 @@ class CellOrder:
 
     def keys(self) -> wp.array:
         """Array of 2 * size int64, the keys in its first half, as the radix sort wants it."""
-        wp.launch(
+        self.scene.crew.launch(
             cell_keys,
             self.pool.size,
             [
@@ -61,6 +63,5 @@ class CellOrder:
                 self.pool.position,
                 self.values,
             ],
-            device=self.scene.device,
         )
         return self.values

@@ -27,12 +27,20 @@ Solvers = Annotated[
 ]
 Device = Annotated[str, typer.Option(help="cpu, or cuda:0, cuda:1, ...; cuda: all GPUs, shared out")]
 Backend = Annotated[str, typer.Option(help="language of the kernels: warp or taichi")]
-Threads = Annotated[int, typer.Option(min=1, help="CPU threads of taichi; with several, the last bits vary")]
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="threads of the CPU for a run; default all cores for a single run, one where costs are compared. "
+        "Warp's results are the same whatever their number, the last bits of taichi's are not",
+        show_default=False,
+    ),
+]
 Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/ and the scenario or verb")]
 WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="run everything again, whatever is stored")]
 Jobs = Annotated[
-    int | None, typer.Option(min=1, help="runs at a time where timing does not matter; default 2, or 1 on CUDA")
+    int | None, typer.Option(min=1, help="runs at a time where timing does not matter; default all cores, or 1 on CUDA")
 ]
 Executor = Annotated[
     str | None,
@@ -61,7 +69,7 @@ Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter r
 SHARED: dict[str, tuple[Any, Any]] = {
     "device": (Device, "cpu"),
     "backend": (Backend, "warp"),
-    "threads": (Threads, 1),
+    "threads": (Threads, None),
     "out": (Out, None),
     "wall_limit": (WallLimit, None),
     "jobs": (Jobs, None),

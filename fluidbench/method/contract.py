@@ -171,6 +171,9 @@ class Method(ABC):
     rank: ClassVar[int] = 100  # where it stands among others in tables
     backends: ClassVar[tuple[str, ...]] = ("warp",)  # languages of its kernels
     devices: ClassVar[tuple[str, ...]] = ("cpu", "cuda")
+    shares_threads: ClassVar[bool] = (
+        False  # whether its Warp kernels can share several threads of the CPU (native/crew)
+    )
     bounded: ClassVar[bool] = True  # whether its bounds are of stability; otherwise they are of accuracy
     bare: ClassVar[dict[str, Any]] = {}  # settings that leave of it what its theory of stability knows
     axes: ClassVar[tuple[NumericalAxis, ...]] = ()  # settings of its own that `stability` varies

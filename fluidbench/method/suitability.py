@@ -11,7 +11,7 @@ from ..errors import UserError
 from ..scenario.scenario import Scenario
 from .contract import Method
 from .features import needed
-from .target import Target
+from .target import DEFAULT_BACKEND, Target
 from .timestep import Bound, lost_speed
 
 LOST = 0.1  # share of a scenario's own speed that single precision may lose
@@ -25,6 +25,13 @@ def check_backend(method: type[Method], target: Target) -> None:
         raise UserError(f"{method.name} has no backend '{target.backend}'; it has {' and '.join(method.backends)}")
     if target.device.partition(":")[0] not in method.devices:
         raise UserError(f"{method.name} runs on {' and '.join(method.devices)} alone, not on {target.device}")
+    if target.threads > 1 and not can_share(method, target):
+        raise UserError(f"{method.name} runs on one thread of the CPU, not on {target.threads}")
+
+
+def can_share(method: type[Method], target: Target) -> bool:
+    """Whether several threads of the CPU can work for a method there; a GPU has its own."""
+    return target.device == "cpu" and (target.backend != DEFAULT_BACKEND or method.shares_threads)
 
 
 class Demands:
@@ -44,6 +51,11 @@ class Demands:
         """The scenario as if made of each of those materials, up to a time [s]."""
         k = min(int(np.searchsorted(self.ages, time)), len(self.ages) - 1)
         return [self.scenarios[0]] if self.scenarios[k] is self.scenarios[0] else [self.scenarios[0], self.scenarios[k]]
+
+    def unchanged_until(self, time: float) -> float:
+        """How long what `until` says of a time [s] stays true [s]."""
+        k = int(np.searchsorted(self.ages, time))
+        return float(self.ages[k]) if k < len(self.ages) - 1 else math.inf
 
     def worst(self) -> Scenario:
         """The scenario made of the most demanding material of the whole run."""

@@ -43,6 +43,7 @@ class Clock:
         self.scenario, self.crew = scenario, crew
         self.first, self.tick = -1, scenario.schedule[0]  # tick number of the first row, its length [s]
         self._row = 0  # of the device, once all that was enqueued is done
+        self._entered = self._released = np.zeros(1, int)  # particles, discs
         hours = self.hours = Hours()
         hours.tick = self.tick
         with wp.ScopedDevice(crew.device):
@@ -67,6 +68,16 @@ class Clock:
         self.first, self.hours.tick = -1, tick
         self._write(np.array([now, now + tick]))
         self._turn_to(0)
+
+    @property
+    def entered(self) -> int:
+        """Particles of the stream that are in the nozzle now, or beyond."""
+        return int(self._entered[self._row])
+
+    @property
+    def released(self) -> int:
+        """Discs of the stream that have left the nozzle."""
+        return int(self._released[self._row])
 
     def strike(self) -> None:
         """Enqueue: on to the next row."""
@@ -94,7 +105,8 @@ class Clock:
             }
             columns["drift"][:-1] /= step
         if self.stream is not None:
-            columns["entered"] = self.stream.entered(times) * len(self.stream.offsets)
+            columns["entered"] = self._entered = self.stream.entered(times) * len(self.stream.offsets)
+            self._released = self.stream.released(times)
         for name, values in columns.items():
             array: wp.array = getattr(self.hours, name)
             kind = np.int32 if array.dtype is wp.int32 else np.float32

@@ -139,6 +139,7 @@ class Crew:
     def launch(
         self, kernel: Any, size: Any, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
     ) -> None:
+        assert not kernel.is_generic, "a recording on the CPU tells kernels by their names alone"
         shared = kernel.adj.args[0].label == "share"
         if shared:
             deal = DEAL if size % 2**DEAL == 0 and size >= 64 * 2**DEAL else 0
@@ -148,8 +149,17 @@ class Crew:
         if size and (shared or self._number == 0):
             launch = wp.launch if self._number == 0 else uncounted_launch
             launch(kernel, size, inputs, outputs, device=self.device, block_dim=block_dim)
+        self._meet()
+
+    def _meet(self) -> None:
         if self._of > 1:
             uncounted_launch(meet, 1, [self._gate, self._of, wp.uint64(self._address)], device=self.device)
+
+    def alone(self, work: Callable[[], object]) -> None:
+        """Enqueue what is no launch: the first thread's."""
+        if self.leading:
+            work()
+        self._meet()
 
     def run(self, key: Any, work: Callable[[], object]) -> None:
         """Replay some work, recorded at the first time."""

@@ -14,7 +14,7 @@ import warp as wp
 
 from ..method.vitals import Vital, complaint, mass_energy
 from .crew import raise_fault
-from .pool import FAULT_ASTRAY, FAULT_STATE, Pool
+from .pool import FAULT_ASTRAY, FAULT_STATE, Memory, Pool
 from .scene import Box, Force, Scene, force_potential
 
 wp.set_module_options({"enable_backward": False})
@@ -64,12 +64,10 @@ NUMBERS, WHOLE, PLACES = wp.constant(0), wp.constant(1), wp.constant(2)  # what 
 
 
 @wp.struct
-class Fields:
-    """Every field of a pool, as memory: what an audit needs to know of it."""
+class Ranges:
+    """What every field of a pool may hold."""
 
-    address: wp.array(dtype=wp.uint64)
     holds: wp.array(dtype=int)
-    width: wp.array(dtype=int)  # numbers a particle
     low: wp.array(dtype=float)
     high: wp.array(dtype=float)
 
@@ -77,7 +75,8 @@ class Fields:
 @wp.kernel
 def audit(
     lanes: int,
-    fields: Fields,
+    memory: Memory,
+    ranges: Ranges,
     box: Box,
     capacity: int,
     count: wp.array(dtype=int),
@@ -90,22 +89,22 @@ def audit(
     the domain and by the least value.
     """
     field, world, lane = wp.tid()
-    width = int(fields.width[field])
-    low = float(fields.low[field])
-    high = float(fields.high[field])
+    width = int(memory.width[field])
+    low = float(ranges.low[field])
+    high = float(ranges.high[field])
     i = (world * capacity) * width + lane
     end = (world * capacity + count[world]) * width
     broken = bool(False)
-    if fields.holds[field] == WHOLE:
-        numbers = wp.array(ptr=fields.address[field], shape=(end,), dtype=wp.int32)
+    if ranges.holds[field] == WHOLE:
+        numbers = wp.array(ptr=memory.address[field], shape=(end,), dtype=wp.int32)
         while i < end:
             if numbers[i] < int(low) or numbers[i] > int(high):
                 broken = True
                 numbers[i] = int(low)
             i += lanes
     else:
-        values = wp.array(ptr=fields.address[field], shape=(end,), dtype=wp.float32)
-        places = fields.holds[field] == PLACES
+        values = wp.array(ptr=memory.address[field], shape=(end,), dtype=wp.float32)
+        places = ranges.holds[field] == PLACES
         while i < end:
             x = values[i]
             if places:
@@ -118,7 +117,7 @@ def audit(
                     values[i] = 0.5 * (low + high)
             i += lanes
     if broken:
-        raise_fault(fault, wp.where(fields.holds[field] == PLACES, FAULT_ASTRAY, FAULT_STATE))
+        raise_fault(fault, wp.where(ranges.holds[field] == PLACES, FAULT_ASTRAY, FAULT_STATE))
 
 
 SIGNS = 5  # numbers of a reading
@@ -161,13 +160,18 @@ class Health:
     """Reads the pool's vital signs, now or, from a GPU, while it goes on; makes sure that a pool holds only numbers."""
 
     def __init__(self, scene: Scene, pool: Pool) -> None:
-        self.scene, self.pool, self.fields = scene, pool, described(pool)
+        self.scene, self.pool = scene, pool
+        self.memory, self.ranges = pool.memory, ranges_of(pool)  # made now: a recording would repeat it
         self.lanes = min(scene.lanes, 4096)
         with wp.ScopedDevice(scene.device):
             self.top_speed = wp.zeros(pool.worlds, dtype=float)
             self.nonfinite = wp.zeros(pool.worlds, dtype=int)
             self.energy = wp.zeros((pool.worlds, 2), dtype=wp.float64)
             self.signs = wp.zeros(SIGNS, dtype=wp.float64)
+        self._boxes = []
+        if not scene.device.is_cpu:
+            host = [wp.empty(SIGNS, dtype=wp.float64, device="cpu", pinned=True) for _ in range(2)]
+            self._boxes = [(signs, wp.Event(scene.device)) for signs in host]
 
     def audit(self) -> None:
         """Enqueue the test of every field of the pool against its range; it marks the pool's fault bits."""
@@ -175,7 +179,7 @@ class Health:
         scene.crew.launch(
             audit,
             (len(pool.fields), pool.worlds, self.lanes),
-            [self.lanes, self.fields, scene.box, pool.capacity, pool.count],
+            [self.lanes, self.memory, self.ranges, scene.box, pool.capacity, pool.count],
             [pool.fault],
         )
 
@@ -200,9 +204,10 @@ class Health:
     def post(self, time: float) -> "Letter":
         """A reading of what is there when the device gets to it, which will then be `time` [s]."""
         self.scene.crew.run("inspect", self.inspect)
-        signs = wp.empty(SIGNS, dtype=wp.float64, device="cpu", pinned=True)
+        self._boxes = self._boxes[::-1]  # one letter is on its way while the other is read
+        signs, sent = self._boxes[0]
         wp.copy(signs, self.signs)
-        return Letter(time, list(self.pool.counts), signs, wp.record_event(wp.Event(self.scene.device)))
+        return Letter(time, list(self.pool.counts), signs, wp.record_event(sent))
 
     def open(self, letter: "Letter") -> Vital:
         """What it says, once it is here."""
@@ -255,9 +260,9 @@ class Letter:
         return {"time": self.time, "counts": self.counts, "signs": self.read()}
 
 
-def described(pool: Pool) -> Fields:
-    """A pool's fields, all of which have been added by now, as memory."""
-    fields = Fields()
+def ranges_of(pool: Pool) -> Ranges:
+    """What a pool's fields, all of which have been added by now, may hold."""
+    found = Ranges()
     kinds = {name: WHOLE if array.dtype is wp.int32 else NUMBERS for name, array in pool.fields.items()}
     kinds["position"] = PLACES
     most = 2.0**31 - 256.0  # the largest float32 that is an int32
@@ -266,10 +271,7 @@ def described(pool: Pool) -> Fields:
         for name, (low, high) in pool.ranges.items()
     ]
     with wp.ScopedDevice(pool.scene.device):
-        fields.address = wp.array([array.ptr for array in pool.fields.values()], dtype=wp.uint64)
-        fields.holds = wp.array(list(kinds.values()), dtype=int)
-        sizes = [wp.types.type_size_in_bytes(array.dtype) // 4 for array in pool.fields.values()]
-        fields.width = wp.array(sizes, dtype=int)
-        fields.low = wp.array([low for low, _ in ranges], dtype=float)
-        fields.high = wp.array([high for _, high in ranges], dtype=float)
-    return fields
+        found.holds = wp.array(list(kinds.values()), dtype=int)
+        found.low = wp.array([low for low, _ in ranges], dtype=float)
+        found.high = wp.array([high for _, high in ranges], dtype=float)
+    return found

@@ -1,5 +1,6 @@
 """The particle pool: one preallocated structure of arrays, shared by all worlds, reordered as a whole."""
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import warp as wp
 from ..errors import UserError
 from ..method.contract import OutOfCapacity
 from ..scenario.extent import ADDRESSABLE
+from .crew import index_of
 from .scene import Scene
 
 wp.set_module_options({"enable_backward": False})
@@ -30,6 +32,16 @@ CORE = {
 def whole_warps(capacity: int) -> int:
     """Capacity rounded up to whole groups of 32 slots, so that no GPU warp is cut by the end of a launch."""
     return 32 * max(1, -(-capacity // 32))
+
+
+@wp.struct
+class Memory:
+    """The fields of a pool as words of 32 bits: a particle has `width` of them in a field, `before` in earlier ones."""
+
+    address: wp.array(dtype=wp.uint64)
+    width: wp.array(dtype=int)
+    before: wp.array(dtype=int)
+    spare: wp.array(dtype=int)  # room for all
 
 
 class Pool:
@@ -129,12 +141,22 @@ class Pool:
                 wp.copy(array, wp.array(values, dtype=array.dtype, device=self.scene.device), first, 0, n)
             self.set_count(world, self.counts[world] + n)
 
+    @cached_property
+    def memory(self) -> "Memory":
+        """The fields, all of which have been added by now, as words."""
+        widths = [wp.types.type_size_in_bytes(array.dtype) // 4 for array in self.fields.values()]
+        memory = Memory()
+        with wp.ScopedDevice(self.scene.device):
+            memory.address = wp.array([array.ptr for array in self.fields.values()], dtype=wp.uint64)
+            memory.width = wp.array(widths, dtype=int)
+            memory.before = wp.array(np.cumsum([0, *widths[:-1]]), dtype=int)
+            memory.spare = wp.empty(self.size * sum(widths), dtype=int)
+        return memory
+
     def permute(self, order: wp.array) -> None:
-        """Move the particle in slot order[i] to slot i, all fields at once; order stays within each world."""
-        for array in self.fields.values():
-            scratch = wp.empty_like(array)
-            wp.launch(gather, self.size, [order, array, scratch], device=self.scene.device)
-            wp.copy(array, scratch)
+        """Enqueue: the particle in slot order[i] to slot i, all fields at once; order stays within each world."""
+        for kernel in (set_aside, put_back):
+            self.scene.crew.launch(kernel, self.size, [self.size, order, self.memory])
         self.stale = True
 
     def snapshot(self, world: int = 0, **more: np.ndarray) -> dict[str, np.ndarray]:
@@ -147,11 +169,29 @@ class Pool:
         return {name: values[order] for name, values in columns.items()}
 
     def footprint(self) -> dict[str, int]:
-        """Bytes of each field."""
-        return {name: array.capacity for name, array in self.fields.items()}
+        """Bytes of each field, and of what sorting needs."""
+        return {name: array.capacity for name, array in self.fields.items()} | {"spare": self.memory.spare.capacity}
 
 
 @wp.kernel
-def gather(order: wp.array(dtype=int), source: wp.array(dtype=Any), target: wp.array(dtype=Any)):  # type: ignore[valid-type]
-    i = wp.tid()
-    target[i] = source[order[i]]
+def set_aside(share: wp.vec3i, size: int, order: wp.array(dtype=int), memory: Memory):
+    """All words of the particles in their new order."""
+    i = index_of(share, wp.tid())
+    for field in range(memory.width.shape[0]):
+        width = memory.width[field]
+        words = wp.array(ptr=memory.address[field], shape=(size * width,), dtype=wp.int32)
+        to = memory.before[field] * size + i * width
+        for k in range(width):
+            memory.spare[to + k] = words[order[i] * width + k]
+
+
+@wp.kernel
+def put_back(share: wp.vec3i, size: int, order: wp.array(dtype=int), memory: Memory):
+    """And back into their fields."""
+    i = index_of(share, wp.tid())
+    for field in range(memory.width.shape[0]):
+        width = memory.width[field]
+        words = wp.array(ptr=memory.address[field], shape=(size * width,), dtype=wp.int32)
+        at = memory.before[field] * size + i * width
+        for k in range(width):
+            words[i * width + k] = memory.spare[at + k]

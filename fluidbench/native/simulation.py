@@ -77,9 +77,10 @@ class Simulation(Session):
         self.done = 0
         self.unseen = True  # whether somebody else may have changed the particles since the last audit
         self.aged = 0  # ticks that this process has run
-        self._identity = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
-        self._order = wp.array(self._identity, dtype=int, device=self.scene.device)
-        self._planned: tuple[Any, Plan] | None = None
+        slots = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
+        self._identity, self._order = (wp.array(slots, dtype=int, device=self.scene.device) for _ in range(2))
+        self._sorts = False  # whether the solver has an order
+        self._planned: tuple[float, float, Plan] | None = None  # speed, end of its validity [s], plan
         self.posted: Letter | None = None  # a reading on its way from a GPU
         self.heard = Vital(self.speed, 0.0, 0.0, None)
         self.substep_launches = self.process_launches = 0  # of a substep; of the processes a tick, at most
@@ -131,13 +132,12 @@ class Simulation(Session):
         """One tick: feed, plan, and run its substeps. Nothing here waits for a GPU, but where matter gives birth."""
         if not self.scene.device.is_cpu and self.done % LOOK_TICKS == 0:
             self._exchange()
-        if self.done % SORT_TICKS == 0 and (keys := self.solver.sort_keys()) is not None:
-            self.reorder(keys)
+        if self.done % SORT_TICKS == 0:
+            self._sort()
         self.scene.clock.show(self.done)
         feeding = self._expect()
         steps = self._plan()
-        self.scene.set_dt(steps.dt)
-        self._run_tick(feeding, steps.substeps)
+        self._run_tick(feeding, steps)
         self.done += 1
         self.aged += 1
         return steps
@@ -145,17 +145,17 @@ class Simulation(Session):
     def _expect(self) -> bool:
         """What the host must know or do at the start of a tick; whether the nozzle holds anything to be moved."""
         self.placement.advance(self.now)
-        return self.emission is not None and self.emission.expect(self.now)
+        return self.emission is not None and self.emission.expect()
 
     def _plan(self) -> Plan:
         """The substeps of the coming tick, planned anew where the speed or the materials are others."""
-        materials = (s for d in self._demands for s in d.until(self.now + self.tick))
-        key = (self.speed, *map(id, materials))
-        if self._planned is None or self._planned[0] != key:
-            self._planned = key, plan(self.bounds(), self.tick)
-        return self._planned[1]
+        end = self.now + self.tick
+        if self._planned is None or self._planned[0] != self.speed or end > self._planned[1]:
+            same = min(d.unchanged_until(end) for d in self._demands)
+            self._planned = self.speed, same, plan(self.bounds(), self.tick)
+        return self._planned[2]
 
-    def _run_tick(self, feeding: bool, substeps: int) -> None:
+    def _run_tick(self, feeding: bool, steps: Plan) -> None:
         """The audit, what happens to the material, and the substeps: replayed, but the first time in a process and
         where births need the host."""
         on_cpu, births = self.scene.device.is_cpu, self.growing is not None and self.growing.births
@@ -165,16 +165,18 @@ class Simulation(Session):
                 self._audit()
             self._age(feeding)
             self._refresh()
-            self._run(substeps)
+            self.scene.set_dt(steps.dt)
+            self._run(steps.substeps)
             return
+        self.scene.set_dt(steps.dt)
         (stale, self.pool.stale), clock = (self.pool.stale, False), self.scene.clock
         if on_cpu:  # where replay is free
             start = self.scene.crew.recorded(
                 (audited, feeding, stale), lambda: self._start_tick(audited, feeding, stale)
             )
-            self.scene.crew.replay([(start, 1), (self.scene.crew.recorded(1, self._substep), substeps)])
+            self.scene.crew.replay([(start, 1), (self.scene.crew.recorded(1, self._substep), steps.substeps)])
         else:
-            key = audited, feeding, stale, substeps
+            key = audited, feeding, stale, steps.substeps
             self.scene.crew.replay([(self.scene.crew.recorded(key, lambda: self._whole_tick(*key)), 1)])
         clock.struck()
 
@@ -279,10 +281,24 @@ class Simulation(Session):
     def capacity(self) -> int:
         return self.pool.size
 
+    def _sort(self) -> None:
+        """Put side by side in memory what is side by side, if the solver has an order for it."""
+        if not self._use_graphs or self.aged == 0:
+            self._sorts = (keys := self.solver.sort_keys()) is not None
+            if keys is not None:
+                self.reorder(keys)
+        elif self._sorts:
+            self.scene.crew.run("sort", lambda: self.reorder(self.solver.sort_keys()))
+            self.pool.stale = True
+
     def reorder(self, keys: wp.array) -> None:
-        """Sort the pool by a solver's keys."""
-        self._order.assign(self._identity)
-        wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
+        """Enqueue: the pool in the order of a solver's keys."""
+
+        def sort() -> None:
+            wp.copy(self._order, self._identity)
+            wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
+
+        self.scene.crew.alone(sort)
         self.pool.permute(self._order)
 
     def _substep(self) -> None:
@@ -335,7 +351,7 @@ class Simulation(Session):
         found = self.solver.traffic()
         if found is not None:
             used = sum(self.pool.counts) / self.pool.size
-            found["memory"] += 2.0 * used * sum(self.pool.footprint().values())
+            found["memory"] += 2.0 * used * sum(array.capacity for array in self.pool.fields.values())
         return found
 
     def statistics(self) -> dict[str, Any]:

@@ -81,9 +81,9 @@ class Stream:
         ahead = (COLUMN + 0.5) * self.scenario.spacing / self.scenario.nozzle.speed
         return np.searchsorted(self.extruding, self.scenario.track.extruded(time) + ahead)
 
-    def released(self, time: float) -> int:
-        """How many discs have left the nozzle at `time`."""
-        return int(np.searchsorted(self.release_time, time, side="right"))
+    def released(self, time) -> Any:
+        """How many discs have left the nozzle at `time` [s], a number or an array."""
+        return np.searchsorted(self.release_time, time, side="right")
 
     def mass(self, time: float) -> float:
         """Mass released up to `time` [kg]."""

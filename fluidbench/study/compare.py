@@ -18,7 +18,7 @@ from ..scenario import Scenario
 from ..scenario.numerics import configure
 from .compare_report import report
 from .result import Result
-from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number, targets_of
+from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number, targets_of, threads_alone
 
 WALL_LIMIT = 900.0  # s
 
@@ -59,10 +59,12 @@ def compare(
     if render_every is not None:
         require_number(render_every, "render_every", 1e-9)
     languages = backends or [options.get("backend", DEFAULT_BACKEND)]
-    threads = options.get("threads", 1)
+    threads = options.get("threads")
     one = threads if len(languages) == 1 else 1
     place = Workplace.of({**options, "backend": languages[0], "threads": one}, WALL_LIMIT, names)
-    targets = targets_of(place.target.device, languages, threads)
+    if threads is None and len(names) == repeats == len(languages) == 1:
+        threads = threads_alone(resolved, names[0], place.target)
+    targets = targets_of(place.target.device, languages, 1 if threads is None else threads)
     if not verb.replace("-", "").replace("_", "").isalnum():
         raise UserError(f"verb: a plain name is wanted (got {quoted(verb)})")
     planned = jobs(

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from ..errors import UserError, quoted, suggestion
-from ..method.suitability import check_backend
+from ..method.suitability import can_share, check_backend
 from ..method.target import BACKENDS, DEFAULT_BACKEND, Target
 from ..registry import get_method, method_names
 from ..report.progress import Display, Line
@@ -23,7 +23,10 @@ from ..runs.execute import as_executor, execute
 from ..runs.store import Store
 from ..runs.work import Work
 from ..scenario import Scenario
+from ..scenario.layout import capacity_of
 from ..scenario.library import load
+
+LEAST_SHARE = 1000  # particles that are worth a thread
 
 
 class Options(TypedDict, total=False):
@@ -31,11 +34,12 @@ class Options(TypedDict, total=False):
 
     - device: "cpu" (default), "cuda:0", ...; "cuda" shares out all GPUs where timing does not matter
     - backend: language of the kernels, "warp" (default) or "taichi"
-    - threads: CPU threads of taichi; with several, the last bits vary
+    - threads: threads of the CPU for a run; default all cores where a single run is made, one where costs are compared.
+      Warp's results are the same bits for any number; the last bits of taichi's vary with several
     - out: folder for the runs, where a later call finds them; default a temporary one that lives as long as the result
     - fresh: run everything again, whatever is stored
     - wall_limit: how long a run may take [s]; what cannot make it is stopped early
-    - jobs: runs at a time where timing does not matter; default 2, or 1 on CUDA
+    - jobs: runs at a time where timing does not matter; default as many as there are cores, or 1 on CUDA
     - executor: where runs happen instead of here: anything with the interface of concurrent.futures that reaches the
       same folders, a dask Client, or a name such as "slurm" (runs/cluster.py)
     - progress: whether to show it; default True
@@ -43,7 +47,7 @@ class Options(TypedDict, total=False):
 
     device: str
     backend: str
-    threads: int
+    threads: int | None
     out: str | Path | None
     fresh: bool
     wall_limit: float
@@ -81,7 +85,8 @@ class Workplace:
                 raise UserError(f"no option {quoted(name)}{suggestion(name, Options.__annotations__)}")
         limit = options.get("wall_limit", wall_limit)
         require_number(limit, "wall_limit", 1e-3)
-        require_number(options.get("threads", 1), "threads", 1, whole=True)
+        threads = 1 if options.get("threads") is None else options["threads"]
+        require_number(threads, "threads", 1, whole=True)
         if options.get("jobs") is not None:
             require_number(options.get("jobs"), "jobs", 1, whole=True)
         for name in ("device", "backend"):
@@ -90,7 +95,7 @@ class Workplace:
         device = options.get("device", "cpu")
         gpus = visible_gpus() if device == "cuda" else ()
         device = "cuda:0" if device == "cuda" else device
-        target = one_target(device, options.get("backend", DEFAULT_BACKEND), options.get("threads", 1))
+        target = one_target(device, options.get("backend", DEFAULT_BACKEND), threads)
         for method in methods:
             check_backend(get_method(method), target)
         workers, executor = workers_for(options.get("jobs") or len(gpus) or None, target), options.get("executor")
@@ -183,8 +188,8 @@ def target_of(device: str, backend: str, threads: int) -> Target:
         raise UserError(f"backend: no {quoted(backend)}{suggestion(backend, list(BACKENDS))}")
     if find_spec(backend) is None:
         raise UserError(f"the backend {backend} is not installed: pip install {BACKENDS[backend]}")
-    if threads > 4 * (os.cpu_count() or 1):
-        raise UserError(f"{threads} threads are more than this machine's {os.cpu_count()} cores can be shared among")
+    if threads > 4 * cores():
+        raise UserError(f"{threads} threads are more than this machine's {cores()} cores can be shared among")
     _check_device(device)
     return Target(device, backend, threads)
 
@@ -195,7 +200,7 @@ def one_target(device: str, backend: str, threads: int) -> Target:
         raise UserError(f"one backend is wanted here; got {quoted(backend)} (compare takes several)")
     target = target_of(device, backend, threads)
     if target.threads != threads:
-        raise UserError(f"{threads} threads are for taichi on the CPU; warp runs one thread there, a GPU its own")
+        raise UserError(f"{threads} threads are for the CPU; a GPU has its own")
     return target
 
 
@@ -207,10 +212,23 @@ def targets_of(device: str, backends: Sequence[str], threads: int) -> list[Targe
 
 
 def workers_for(jobs: int | None, target: Target) -> int:
-    """Runs at a time: as asked, or as many as two cores hold; one on a GPU."""
-    if jobs is not None and not 1 <= jobs <= 8 * (os.cpu_count() or 1):
-        raise UserError(f"{jobs} runs at a time are too many for this machine's {os.cpu_count()} cores, or too few")
-    return jobs or (max(1, 2 // target.threads) if target.device == "cpu" else 1)
+    """Runs at a time: as asked, or as many as the cores hold; one on a GPU."""
+    if jobs is not None and not 1 <= jobs <= 8 * cores():
+        raise UserError(f"{jobs} runs at a time are too many for this machine's {cores()} cores, or too few")
+    return jobs or (max(1, cores() // target.threads) if target.device == "cpu" else 1)
+
+
+def cores() -> int:
+    """Cores of this machine that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def threads_alone(scenario: Scenario, method: str, target: Target) -> int:
+    """Threads for a run that has the machine for itself: all cores, but none for fewer than a thousand particles, and
+    one where more would change the last bits, or cannot help."""
+    if target.backend != DEFAULT_BACKEND or not can_share(get_method(method), target):
+        return 1
+    return min(cores(), max(1, capacity_of(scenario) // LEAST_SHARE))
 
 
 def visible_gpus() -> tuple[str, ...]:

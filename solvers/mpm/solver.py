@@ -51,6 +51,7 @@ class SolverMPM(Solver):
     name = "mpm"
     rank = 1
     paradigm = "hybrid: particles carry state, a background grid carries momentum"
+    shares_threads = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigMPM
@@ -60,7 +61,7 @@ class SolverMPM(Solver):
         FAULT_STENCIL: "a particle left the blocks of the grid within one step",
     }
 
-    typical_rate, typical_bytes = 3.5e6, 2500.0
+    typical_rate, typical_bytes = 5.0e6, 3500.0
     axes: ClassVar = (NumericalAxis("particles_per_cell", "grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-", 1 / 3),)
 
     @classmethod

@@ -59,6 +59,7 @@ class SolverPBD(Solver):
     name = "pbd"
     rank = 3
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
+    shares_threads = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigPBD
@@ -83,7 +84,7 @@ class SolverPBD(Solver):
         "wall_friction",
     )
 
-    typical_rate, typical_bytes = 1.2e5, 900.0
+    typical_rate, typical_bytes = 2.5e5, 900.0
     bounded = False
 
     @classmethod

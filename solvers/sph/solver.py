@@ -69,6 +69,7 @@ class SolverSPH(Solver):
     name = "sph"
     rank = 2
     paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
+    shares_threads = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigSPH

@@ -158,7 +158,7 @@ def test_a_run_leaves_its_record_series_and_frames(tmp_path):
 
 
 def test_launches_of_processes_are_told_by_tick(tmp_path):
-    """Growth: births and their number, in every tick and once more before the first look."""
+    """Growth: births and their number."""
     foam = {"density": 100.0, "youngs_modulus": 2e3, "yield_stress": 20.0, "expansion": {"ratio": 2.0, "time": 0.1}}
     s = scenario(duration=0.04, tick=0.01, output_interval=0.02, spacing=0.02, material=foam)
     perform(Job(s.model_dump(mode="json"), "mpm"), tmp_path, lambda _: None)
@@ -166,12 +166,12 @@ def test_launches_of_processes_are_told_by_tick(tmp_path):
     sim = Simulation(s, "mpm")
     for _ in range(4):
         sim.advance_tick()
-    assert record["launches"]["process_per_tick"] == sim.process_launches.count / 4 > 1
+    assert record["launches"]["process_per_tick"] == sim.process_launches == 2
     assert "volume_growth" in record["measures"]
 
 
 def test_a_run_that_breaks_has_no_measures(tmp_path, monkeypatch):
-    monkeypatch.setattr("fluidbench.native.health.Health.broken", lambda self: "it broke")
+    monkeypatch.setattr("fluidbench.native.health.Health.broken", lambda self, bits=None: "it broke")
     s = scenario(duration=0.02, tick=0.01, output_interval=0.02, spacing=0.02)
     perform(Job(s.model_dump(mode="json"), "mpm"), tmp_path, lambda _: None)
     record, _ = read_record(tmp_path)

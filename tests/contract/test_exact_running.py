@@ -24,7 +24,7 @@ def test_outputs_come_at_their_ticks_and_the_first_before_all():
     assert (outcome.verdict, outcome.reason, outcome.time, sim.done) == (Verdict.COMPLETED, "", 1.0, 8)
     assert outcome.substeps == 24 and outcome.particle_substeps == 24 * 8 and outcome.peak_particles == 8
     assert outcome.binding == {"told": 1.0} and outcome.wall > 0 and outcome.cpu >= 0 and outcome.prepare_wall >= 0
-    assert sim.substep_launches.count == 1 and sim.scenario.schedule == (0.125, 8, 2)
+    assert sim.substep_launches == 1 and sim.scenario.schedule == (0.125, 8, 2)
 
 
 def test_clocks_run_only_while_the_loop_does(monkeypatch):
@@ -87,18 +87,26 @@ def test_a_tick_is_cut_into_equal_substeps_of_the_bound():
 
 
 def test_every_32nd_tick_sorts_the_pool():
-    sorted_at = []
+    """By keys that turn the order round: at the first tick, and in what is replayed later."""
+    import warp as wp
 
     class Sorting(Stepping):
         dt = 9.0
 
         def sort_keys(self):
-            sorted_at.append(sim.done)
+            keys = np.zeros(2 * self.pool.size, np.int64)
+            keys[: self.pool.size] = [7 - i if i < 8 else i for i in range(self.pool.size)]
+            self.kept = wp.array(keys, dtype=wp.int64)  # a recording needs them again
+            return self.kept
 
-    sim = falling(Sorting, duration=8.125)
-    assert sim.ticks == 65
-    drive(sim)
-    assert sorted_at == [0, 32, 64] and simulation.SORT_TICKS == 32
+    sim, turned = falling(Sorting, duration=8.125), []
+    assert sim.ticks == 65 and simulation.SORT_TICKS == 32
+    for _ in range(65):
+        before = sim.pool.origin.numpy()[:8].tolist()
+        sim.advance_tick()
+        if sim.pool.origin.numpy()[:8].tolist() == before[::-1]:
+            turned.append(sim.done - 1)
+    assert turned == [0, 32, 64]
 
 
 def test_the_order_of_a_sort_is_that_of_the_keys():
@@ -172,7 +180,9 @@ def test_what_breaks_ends_the_run_with_its_time_and_its_reason():
 @pytest.mark.parametrize("start", [0.0, 0.5])
 def test_what_finds_no_room_ends_the_run(start):
     small = falling()
-    small.emission = SimpleNamespace(advance=lambda now, tick: small.pool.need(0, 99 if now >= start else 0))
+    small.emission = SimpleNamespace(
+        expect=lambda: small.pool.need(0, 99 if small.now >= start else 0) or True, feed=lambda: None
+    )
     outcome = drive(small)
     assert outcome.verdict is Verdict.OUT_OF_CAPACITY and "and 107 are needed" in outcome.reason
 
@@ -216,11 +226,13 @@ def test_a_method_is_prepared_and_refreshed_before_the_first_look():
 def test_launches_are_captured_or_waited_for():
     sim = Simulation(scenario(**FALLING), Told, graphs=False)
     sim.advance_tick()
-    assert sim.solver.told == ["refresh", "wait", "wait"] and sim.substep_launches.count == 1
-    assert not sim._graphs and list(falling()._graphs) == []
+    assert sim.solver.told == ["refresh", "wait", "wait"] and sim.substep_launches == 1
+    assert list(sim.scene.crew.graphs) == ["audit"] and list(falling().scene.crew.graphs) == []
     captured = falling(Stepping)
     captured.advance_tick()
-    assert list(captured._graphs) == [1] and captured._use_graphs
+    assert list(captured.scene.crew.graphs) == ["audit", 1] and captured._use_graphs
+    captured.advance_tick()
+    assert list(captured.scene.crew.graphs) == ["audit", 1, (True, False, False)]
 
 
 def test_layers_come_at_their_time_and_carry_no_spin():

@@ -226,7 +226,8 @@ def test_a_target_in_words_and_its_other_backend():
     assert (HERE.suffix, HERE.options) == ("", "") and Target(backend="taichi", threads=3).suffix == " (taichi)"
     assert Target("cuda:0", "taichi").options == " --device cuda:0 --backend taichi"
     assert Target(backend="taichi", threads=3).options == " --backend taichi --threads 3"
-    assert Target(threads=4).threads == 1 == Target("cuda:0", "taichi", 4).threads
+    assert Target(threads=4).threads == 4 and Target("cuda:0", "taichi", 4).threads == 1
+    assert Target(threads=4).options == " --threads 4"
     assert HERE.other == Target(backend="taichi") and Target(backend="taichi", threads=3).other == HERE
     with pytest.raises(UserError, match="runs on cuda:0 alone"):
         Target("cuda:1", "taichi")

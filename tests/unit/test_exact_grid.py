@@ -8,7 +8,7 @@ import warp as wp
 
 from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Scene
 from solvers.mpm import grid as mpm_grid
-from solvers.mpm import kernels_warp as mpm
+from solvers.mpm import particle as mpm
 from solvers.mpm import walls as mpm_walls
 
 from ..conftest import scenario

@@ -1,7 +1,6 @@
 """Options of the command line: what is accepted, and what is refused just beyond."""
 
 import math
-import os
 
 import pytest
 
@@ -9,7 +8,10 @@ from fluidbench.cli import options
 from fluidbench.errors import UserError
 from fluidbench.method.target import Target
 from fluidbench.registry import method_names
+from fluidbench.scenario.layout import capacity_of
 from fluidbench.study import workplace
+
+from ..conftest import bead
 
 YEAR = 3.2e7
 
@@ -129,11 +131,12 @@ def test_methods_are_those_named_or_all_that_are_here(monkeypatch, tmp_path):
 
 
 def test_targets_threads_and_jobs(monkeypatch):
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(workplace, "cores", lambda: 2)
+    monkeypatch.setattr(workplace, "_check_device", lambda device: None)
     assert workplace.target_of("cpu", "taichi", 8) == Target(backend="taichi", threads=8)
     for words, call in (
         ("^9 threads are more than this machine's 2 cores", lambda: workplace.target_of("cpu", "taichi", 9)),
-        ("2 threads are for taichi", lambda: workplace.one_target("cpu", "warp", 2)),
+        ("2 threads are for the CPU; a GPU has its own", lambda: workplace.one_target("cuda:0", "warp", 2)),
         ("one backend is wanted here; got 'warp,taichi'", lambda: workplace.one_target("cpu", "warp,taichi", 1)),
         ("17 runs at a time are too many for this machine's 2 cores", lambda: workplace.workers_for(17, Target())),
         ("no 'wrap'; did you mean 'warp'", lambda: workplace.target_of("cpu", "wrap", 1)),
@@ -153,9 +156,24 @@ def test_targets_threads_and_jobs(monkeypatch):
         )
     ] == [2, 1, 16, 1, 1, 3]
     assert workplace.targets_of("cpu", ["warp"], 1) == [Target()]
-    assert workplace.targets_of("cpu", ["warp", "taichi"], 2) == [Target(), Target(backend="taichi", threads=2)]
-    with pytest.raises(UserError, match="2 threads are for taichi"):
-        workplace.targets_of("cpu", ["warp"], 2)
+    assert workplace.targets_of("cpu", ["warp", "taichi"], 2) == [
+        Target(threads=2),
+        Target(backend="taichi", threads=2),
+    ]
+    assert workplace.targets_of("cpu", ["warp"], 2) == [Target(threads=2)]
+
+
+def test_a_run_that_is_alone_has_all_cores(monkeypatch):
+    """But none for fewer than a thousand particles, and one where its method or its bits do not allow more."""
+    monkeypatch.setattr(workplace, "cores", lambda: 16)
+    s = bead()  # of a few hundred
+    large = s.model_copy(update={"spacing": s.spacing / 4})
+    room = capacity_of(large)
+    assert workplace.threads_alone(s, "mpm", Target()) == 1 < room // 1000
+    assert workplace.threads_alone(large, "sph", Target()) == min(16, room // 1000)
+    for target in (Target("cuda:0"), Target(backend="taichi")):
+        assert workplace.threads_alone(large, "sph", target) == 1
+    assert workplace.threads_alone(large, "splishsplash-wcsph", Target()) == 1
 
 
 def test_the_spacing_option_comes_last():

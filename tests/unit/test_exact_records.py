@@ -306,7 +306,8 @@ def test_a_fresh_store_makes_each_run_once(tmp_path, monkeypatch):
 
 def test_a_run_in_words():
     run = finished("sph", spacing=1.234e-3, threads=2)
-    assert run.name == "line_bead, sph, d = 1.23 mm" and run.label == "sph" and run.target == HERE and run.ok
+    assert run.name == "line_bead, sph, d = 1.23 mm" and run.label == "sph" and run.ok
+    assert run.target == Target(threads=2)
     other = Run(run.record.model_copy(update={"backend": "taichi"}), run.folder)
     assert other.label == "sph (taichi)" and other.name == "line_bead, sph (taichi), d = 1.23 mm"
     assert other.target.threads == 2

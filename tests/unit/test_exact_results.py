@@ -243,7 +243,8 @@ def test_a_workplace_is_checked_before_anything_is_written(tmp_path):
     for options, words in (
         ({"device": "cuda:99"}, "no device 'cuda:99'"),
         ({"backend": "wrap"}, "backend: no 'wrap'"),
-        ({"threads": 2}, "2 threads are for taichi"),
+        ({"threads": 0}, "threads: a whole number of at least 1"),
+        ({"threads": 10**6}, "1000000 threads are more than"),
         ({"jobs": 0}, "jobs: a whole number of at least 1"),
     ):
         with pytest.raises(UserError, match=words):

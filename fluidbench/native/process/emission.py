@@ -146,19 +146,19 @@ class Emission:
         self.inserted, self.released = progress
         self._inserted.fill_(self.inserted)
 
-    def expect(self, now: float) -> bool:
-        """What will be fed at `now` [s], as far as the host must know it; whether the nozzle still holds anything that
+    def expect(self) -> bool:
+        """What the present hour brings, as far as the host must know it; whether the nozzle still holds anything that
         is to be moved. Raises OutOfCapacity."""
-        pool, stream = self.pool, self.stream
-        fresh = int(stream.entered(now)) * len(stream.offsets) - self.inserted
+        pool, clock = self.pool, self.scene.clock
+        fresh = clock.entered - self.inserted
         if fresh > 0:
             for world in range(pool.worlds):
                 pool.need(world, fresh)
                 pool.counts[world] += fresh
             self.inserted += fresh
-        before, self.released = self.released, stream.released(now)
+        before, self.released = self.released, clock.released
         pool.stale |= fresh > 0 or self.released > before
-        return before < len(stream.extruding)
+        return before < len(self.pipe.extruding)
 
     def feed(self) -> None:
         """Enqueue what the hour of the clock brings: insert, release, and move what is in the nozzle on its way to its
@@ -181,5 +181,5 @@ class Emission:
     def advance(self, now: float, tick: float) -> None:
         """All of it at any time `now` [s], for a tick of any length [s]."""
         self.scene.clock.set(now, tick)
-        if self.expect(now):
+        if self.expect():
             self.feed()
