@@ -19,9 +19,7 @@ class Backend(Protocol):
 
     name: str
 
-    def launch(
-        self, kernel: Any, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
-    ) -> None: ...
+    def launch(self, kernel: Any, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = ()) -> None: ...
 
     def prepare(self, solver: Any) -> None:
         """Compile all kernels of a solver (`solver.kernels`)."""
@@ -38,11 +36,11 @@ class Warp:
     name = "warp"
 
     def __init__(self, crew: Crew) -> None:
-        self.device, self.launch = crew.device, crew.launch
+        self.device, self.launch, self.load = crew.device, crew.launch, crew.load
 
     def prepare(self, solver: Any) -> None:
         for name in {kernel.module.name for kernel in vars(solver.kernels).values()}:
-            wp.load_module(name, device=self.device)
+            self.load(name)
 
     def wait(self) -> None:
         wp.synchronize_device(self.device)

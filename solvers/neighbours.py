@@ -87,7 +87,7 @@ class Neighbours:
     def prepare(self) -> None:
         """Compile the search."""
         for module in (cells, search):
-            wp.load_module(module, device=self.scene.device)
+            self.scene.crew.load(module)
 
     def refresh(self) -> None:
         """The pool was changed from outside: make the lists anew at the next substep."""

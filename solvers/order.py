@@ -49,6 +49,9 @@ class CellOrder:
         self.blocks = wp.vec3i(*(np.ceil(length / (4 * cell)).astype(int) + 1).tolist())
         self.values = wp.zeros(2 * pool.size, dtype=wp.int64, device=scene.device)
 
+    def prepare(self) -> None:
+        self.scene.crew.load(__name__)
+
     def keys(self) -> wp.array:
         """Array of 2 * size int64, the keys in its first half, as the radix sort wants it."""
         self.scene.crew.launch(

@@ -17,7 +17,7 @@ from typing import Any
 
 import warp as wp
 
-from fluidbench.native.crew import index_of
+from fluidbench.native.crew import BLOCK, index_of
 from fluidbench.native.scene import Box
 from fluidbench.native.vector_access import joined, load_int, load_vec4
 
@@ -26,7 +26,6 @@ from .neighbours import LANES
 from .search import FAR, Lists
 
 OWN = 4  # further floats that a particle brings to its pairs, which no neighbour is asked for
-BLOCK = 128  # threads of a block on a GPU
 HEAVY, BLOCKS = 20, 5  # passes of so many floats are held to registers that let so many blocks share a multiprocessor
 ROWS_AHEAD = 24  # floats of neighbours' rows that a thread of a GPU has on their way at once
 ahead = wp.types.vector(length=4, dtype=int)

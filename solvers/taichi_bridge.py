@@ -170,9 +170,7 @@ class Taichi:
         self._replays: dict[tuple[Any, ...], Callable[[], None]] = {}
         start("cpu" if device.is_cpu else "cuda", threads)
 
-    def launch(
-        self, kernel: Callable, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
-    ) -> None:
+    def launch(self, kernel: Callable, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = ()) -> None:
         """Run a kernel, which finds its size in its arguments.
 
         Handing some twenty arguments over from Python takes longer than most kernels do, and they are always the same:

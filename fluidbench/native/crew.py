@@ -16,6 +16,7 @@ import warp as wp
 from warp import launch as uncounted_launch  # meeting is no launch of the method's
 
 wp.set_module_options({"enable_backward": False})
+BLOCK = 128  # threads of a block on a GPU, of every launch: each other number would be compiled anew
 DEAL = 5  # shares of 2^5 particles, where there are plenty
 
 
@@ -131,14 +132,23 @@ class Crew:
             self._address = _give_way()
             wp.load_module(device=device)
 
+    def prepare(self) -> None:
+        """Compile what Warp itself needs for decisions on a GPU, lest the first recording pay for it."""
+        if not self.device.is_cpu:
+            flag = wp.zeros(1, dtype=int, device=self.device)
+            with wp.ScopedCapture(device=self.device):
+                wp.capture_if(flag, on_true=lambda: self.launch(put, 1, [0, flag]))
+
     @property
     def leading(self) -> bool:
         """Whether what is launched now is the part of the first thread."""
         return self._number == 0
 
-    def launch(
-        self, kernel: Any, size: Any, inputs: Sequence[Any], outputs: Sequence[Any] = (), block_dim: int = 256
-    ) -> None:
+    def load(self, module: Any) -> None:
+        """Compile and load a module as its kernels will be launched."""
+        wp.load_module(module, device=self.device, block_dim=None if self.device.is_cpu else BLOCK)
+
+    def launch(self, kernel: Any, size: Any, inputs: Sequence[Any], outputs: Sequence[Any] = ()) -> None:
         assert not kernel.is_generic, "a recording on the CPU tells kernels by their names alone"
         shared = kernel.adj.args[0].label == "share"
         if shared:
@@ -148,7 +158,7 @@ class Crew:
             inputs = [wp.vec3i(self._number, self._of, deal), *inputs]
         if size and (shared or self._number == 0):
             launch = wp.launch if self._number == 0 else uncounted_launch
-            launch(kernel, size, inputs, outputs, device=self.device, block_dim=block_dim)
+            launch(kernel, size, inputs, outputs, device=self.device, block_dim=BLOCK)
         self._meet()
 
     def _meet(self) -> None:

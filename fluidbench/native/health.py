@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 from ..method.vitals import Vital, complaint, mass_energy
-from .crew import raise_fault
+from .crew import index_of, raise_fault
 from .pool import FAULT_ASTRAY, FAULT_STATE, Memory, Pool
 from .scene import Box, Force, Scene, force_potential
 
@@ -74,7 +74,9 @@ class Ranges:
 
 @wp.kernel
 def audit(
+    share: wp.vec3i,
     lanes: int,
+    worlds: int,
     memory: Memory,
     ranges: Ranges,
     box: Box,
@@ -88,7 +90,10 @@ def audit(
     Positions and whole numbers become addresses in the passes: what is broken among them is replaced, by the middle of
     the domain and by the least value.
     """
-    field, world, lane = wp.tid()
+    place = index_of(share, wp.tid())
+    lane = place % lanes
+    world = (place / lanes) % worlds
+    field = place / (lanes * worlds)
     width = int(memory.width[field])
     low = float(ranges.low[field])
     high = float(ranges.high[field])
@@ -178,8 +183,8 @@ class Health:
         pool, scene = self.pool, self.scene
         scene.crew.launch(
             audit,
-            (len(pool.fields), pool.worlds, self.lanes),
-            [self.lanes, self.memory, self.ranges, scene.box, pool.capacity, pool.count],
+            len(pool.fields) * pool.worlds * self.lanes,
+            [self.lanes, pool.worlds, self.memory, self.ranges, scene.box, pool.capacity, pool.count],
             [pool.fault],
         )
 

@@ -18,7 +18,7 @@ from ..registry import get_method
 from ..scenario import Scenario
 from ..scenario.layout import capacity_of, emitted, generations
 from ..scenario.numerics import configure
-from . import clock, crew, health
+from . import clock, crew, health, pool
 from .device import CountedLaunches
 from .health import Health, Letter, Vital
 from .pool import Pool
@@ -104,11 +104,12 @@ class Simulation(Session):
     def prepare(self) -> None:
         """Compile and load every kernel."""
         self.solver.prepare()
-        for module in (clock, crew, health):
-            wp.load_module(module, device=self.scene.device)
+        for module in (clock, crew, health, pool):
+            self.scene.crew.load(module)
+        self.scene.crew.prepare()
         parts = {emission: self.emission, curing: self.curing, expansion: self.growing, contact: self.contact}
         for module in (module for module, part in parts.items() if part is not None):
-            wp.load_module(module, device=self.scene.device)
+            self.scene.crew.load(module)
 
     def begin(self) -> Vital:
         self.scene.clock.show(0)

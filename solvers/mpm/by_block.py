@@ -298,7 +298,7 @@ class ByBlock:
 
     def prepare(self) -> None:
         for kernel in (find_homes, gather, self.scatter, self.add_up):
-            kernel.module.load(self.scene.device)
+            self.scene.crew.load(kernel.module)
 
     def refresh(self) -> None:
         self.launch(put, 1, [1, self.homes.outdated])

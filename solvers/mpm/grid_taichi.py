@@ -116,6 +116,17 @@ def near_any(grid, node):
 
 
 @ti.func
+def in_reach(grid, node):
+    """Whether a particle in front of all walls can have this node among its own: one behind a wall at most."""
+    reached = True
+    for axis in ti.static(range(3)):
+        beyond = node[axis] < FIRST - 1 or node[axis] > FIRST + grid.cells[axis] + 1
+        if grid.lower_kind[axis] != PERIODIC and beyond:
+            reached = False
+    return reached
+
+
+@ti.func
 def contact(grid, world, node, axis: ti.template(), rest, table: ti.template(), fill: ti.template()):
     """Share, 0 to 1, with which the wall nearest to a node acts: all of it for mirrors, none for periodic axes, and by
     how full the wall's own node is for rough and no-slip walls."""

@@ -41,6 +41,7 @@ from .grid_taichi import (
     find_blocks,
     folded,
     in_front,
+    in_reach,
     kind_near,
     near,
     near_any,
@@ -233,40 +234,41 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
             block = block_of[t // 64]
             world = block // grid.blocks_per_world
             node = node_at(grid, block - world * grid.blocks_per_world, t % 64)
-            inside, touching, hold = node, ivec3(0), 1.0
-            total, fullness = raw[t], fill[t][3]
             wall = near_any(grid, node)
-            if wall:
-                for axis in ti.static(range(3)):
-                    share = contact(grid, world, node, axis, phases[world, 0, 0], table, fill)
-                    if near(grid, node, axis) and share > 0.0:
-                        hold = ti.min(hold, share)
-                        touching[axis] = 1
-                        inside[axis] = in_front(grid, node, axis)
-                total = folded(grid, world, inside, touching, table, raw)
-                if ti.static(expands):
-                    fullness = folded(grid, world, inside, touching, table, fill)[3]
             result = vec4(0.0)
-            if total[3] > 0.0:
-                kick = dt[world] * force_at(force, world, grid.origin + grid.dx * inside)
-                v = vec3(total[0], total[1], total[2]) / total[3] + kick
-                density = total[3] * grid.inv_volume
-                if ti.static(expands):
-                    density = fullness * grid.inv_volume
+            if (wall or raw[t][3] > 0.0) and in_reach(grid, node):
+                inside, touching, hold = node, ivec3(0), 1.0
+                total, fullness = raw[t], fill[t][3]
                 if wall:
-                    v = bounded(grid, inside, touching, v)
-                    density *= share_inside(grid, inside)
-                result = vec4(v[0], v[1], v[2], density)
-                for axis in ti.static(range(3)):
-                    if inside[axis] != node[axis]:
-                        result = seen_in_wall(result, axis, kind_near(grid, node, axis))
-                if hold < 1.0:  # between a wall that acts in full and none
-                    own = raw[t]
-                    free = vec4(0.0, 0.0, 0.0, result[3])
-                    if own[3] > 0.0:
-                        u = vec3(own[0], own[1], own[2]) / own[3] + kick
-                        free = vec4(u[0], u[1], u[2], result[3])
-                    result = hold * result + (1.0 - hold) * free
+                    for axis in ti.static(range(3)):
+                        share = contact(grid, world, node, axis, phases[world, 0, 0], table, fill)
+                        if near(grid, node, axis) and share > 0.0:
+                            hold = ti.min(hold, share)
+                            touching[axis] = 1
+                            inside[axis] = in_front(grid, node, axis)
+                    total = folded(grid, world, inside, touching, table, raw)
+                    if ti.static(expands):
+                        fullness = folded(grid, world, inside, touching, table, fill)[3]
+                if total[3] > 0.0:
+                    kick = dt[world] * force_at(force, world, grid.origin + grid.dx * inside)
+                    v = vec3(total[0], total[1], total[2]) / total[3] + kick
+                    density = total[3] * grid.inv_volume
+                    if ti.static(expands):
+                        density = fullness * grid.inv_volume
+                    if wall:
+                        v = bounded(grid, inside, touching, v)
+                        density *= share_inside(grid, inside)
+                    result = vec4(v[0], v[1], v[2], density)
+                    for axis in ti.static(range(3)):
+                        if inside[axis] != node[axis]:
+                            result = seen_in_wall(result, axis, kind_near(grid, node, axis))
+                    if hold < 1.0:  # between a wall that acts in full and none
+                        own = raw[t]
+                        free = vec4(0.0, 0.0, 0.0, result[3])
+                        if own[3] > 0.0:
+                            u = vec3(own[0], own[1], own[2]) / own[3] + kick
+                            free = vec4(u[0], u[1], u[2], result[3])
+                        result = hold * result + (1.0 - hold) * free
             moving[t] = result
 
     return SimpleNamespace(

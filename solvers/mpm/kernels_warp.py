@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.method.frame import CARRIED
-from fluidbench.native.crew import index_of, raise_fault
+from fluidbench.native.crew import BLOCK, index_of, raise_fault
 from fluidbench.native.scene import Force, Phase, force_at
-from fluidbench.native.vector_access import add_vec4, in_company, load_vec4, run_of
+from fluidbench.native.vector_access import in_company, load_vec4
 
 from ..bind import rebound
 from .grid import (
@@ -29,10 +29,12 @@ from .grid import (
     turns,
 )
 from .particle import FAULT_STENCIL, Feedback, columns_scaled, inertia, moved, spline, strained, taken
-from .walls import flipped, folded, grip, mirror, near_wall, plane_share, unbound, wall_kind, wall_velocity
+from .together import scatter_together, stencil
+from .walls import flipped, folded, grip, in_reach, mirror, near_wall, plane_share, unbound, wall_kind, wall_velocity
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
+GATHERING = 4  # blocks of a gather that shall share a multiprocessor of a GPU: what registers it may use
 EXPANDS = False  # whether rest densities may differ, see `passes`
 
 
@@ -84,28 +86,30 @@ def p2g(
     if on and wp.min(wp.min(wp.min(s0, s1), wp.min(s2, s3)), wp.min(wp.min(s4, s5), wp.min(s6, s7))) < 0:
         raise_fault(fault, FAULT_STENCIL)
         on = False
-    run = run_of(wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1))
     if not on and not in_company():
         return
-    momentum = m * velocity[p] - a * f
-    for o in range(3):
-        low = bx[o] == bx[0]
-        t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
-        t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
-        mx = momentum + float(o) * wp.vec3(a[0, 0], a[1, 0], a[2, 0])
-        for q in range(3):
-            near = by[q] == by[0]
-            u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
-            my = mx + float(q) * wp.vec3(a[0, 1], a[1, 1], a[2, 1])
-            wxy = wx[o] * wy[q]
-            for r in range(3):
-                mv = my + float(r) * wp.vec3(a[0, 2], a[1, 2], a[2, 2])
-                slot = wp.where(bz[r] == bz[0], u0, u1)
-                w = wxy * wz[r]
-                node = wp.where(on, slot * 64 + lx[o] + ly[q] + lz[r], -1)
-                add_vec4(raw, node, wp.vec4(w * mv[0], w * mv[1], w * mv[2], w * m), run)
-                if wp.static(EXPANDS):
-                    add_vec4(fill, node, wp.vec4(0.0, 0.0, 0.0, w * volume[p] * phase.density), run)
+    scatter_together(
+        raw,
+        fill,
+        wp.static(EXPANDS),
+        wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1),
+        stencil(bx, by, bz, lx, ly, lz),
+        s0,
+        s1,
+        s2,
+        s3,
+        s4,
+        s5,
+        s6,
+        s7,
+        wx,
+        wy,
+        wz,
+        m * velocity[p] - a * f,
+        m,
+        a,
+        volume[p] * phase.density,
+    )
 
 
 def grid_step(
@@ -130,53 +134,59 @@ def grid_step(
     mirror: zeroing them instead costs energy at every step.
     """
     t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, raw.shape[0]))
+    slot, world, corner = int(-1), int(0), wp.vec3i(0, 0, 0)
     while t < end:
-        block = block_of[t >> 6]
-        world = block / grid.blocks_per_world
-        node = node_of(grid, block - world * grid.blocks_per_world, t & 63)
-        total = raw[t]
+        if t >> 6 != slot:  # on the CPU a lane's nodes follow each other: divisions once a block
+            slot = t >> 6
+            world = block_of[slot] / grid.blocks_per_world
+            corner = node_of(grid, block_of[slot] - world * grid.blocks_per_world, 0)
+        node = corner + wp.vec3i((t & 63) >> 4, (t >> 2) & 3, t & 3)
         wall = near_wall(grid, node)
-        inside = node
-        touching = wp.vec3i(0, 0, 0)
-        hold = float(1.0)
-        if wall:
-            for axis in range(3):
-                near = node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
-                held = grip(grid, world, node, axis, phases[world, 0].density, table, fill)
-                if near and held > 0.0:
-                    hold = wp.min(hold, held)
-                    touching[axis] = 1
-                    inside[axis] = mirror(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
-            total = folded(grid, world, inside, touching, table, raw)
         result = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        if total[3] > 0.0:
-            place = wp.vec3(float(inside[0]), float(inside[1]), float(inside[2]))
-            place = grid.origin + wp.cw_mul(grid.dx, place)
-            kick = dt[world] * force_at(force[world], place)
-            v = wp.vec3(total[0], total[1], total[2]) / total[3] + kick
-            if wall:
-                v = wall_velocity(grid, inside, touching, v)
-            density = total[3] * grid.inv_volume
-            if wp.static(EXPANDS):
-                if wall:
-                    density = folded(grid, world, inside, touching, table, fill)[3] * grid.inv_volume
-                else:
-                    density = fill[t][3] * grid.inv_volume
-            if wall:
-                density *= plane_share(grid, inside)
-            result = wp.vec4(v[0], v[1], v[2], density)
+        if (wall or raw[t][3] > 0.0) and in_reach(grid, node):
+            total = raw[t]
+            inside = node
+            touching = wp.vec3i(0, 0, 0)
+            hold = float(1.0)
             if wall:
                 for axis in range(3):
-                    if inside[axis] != node[axis]:
-                        kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
-                        result = flipped(result, axis, kind)
-            if hold < 1.0:
-                result = hold * result + (1.0 - hold) * unbound(raw[t], kick, result[3])
+                    near = node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
+                    held = grip(grid, world, node, axis, phases[world, 0].density, table, fill)
+                    if near and held > 0.0:
+                        hold = wp.min(hold, held)
+                        touching[axis] = 1
+                        inside[axis] = mirror(
+                            node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis]
+                        )
+                total = folded(grid, world, inside, touching, table, raw)
+            if total[3] > 0.0:
+                place = wp.vec3(float(inside[0]), float(inside[1]), float(inside[2]))
+                place = grid.origin + wp.cw_mul(grid.dx, place)
+                kick = dt[world] * force_at(force[world], place)
+                v = wp.vec3(total[0], total[1], total[2]) / total[3] + kick
+                if wall:
+                    v = wall_velocity(grid, inside, touching, v)
+                density = total[3] * grid.inv_volume
+                if wp.static(EXPANDS):
+                    if wall:
+                        density = folded(grid, world, inside, touching, table, fill)[3] * grid.inv_volume
+                    else:
+                        density = fill[t][3] * grid.inv_volume
+                if wall:
+                    density *= plane_share(grid, inside)
+                result = wp.vec4(v[0], v[1], v[2], density)
+                if wall:
+                    for axis in range(3):
+                        if inside[axis] != node[axis]:
+                            kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
+                            result = flipped(result, axis, kind)
+                if hold < 1.0:
+                    result = hold * result + (1.0 - hold) * unbound(raw[t], kick, result[3])
         moving[t] = result
         t += step
 
 
-@wp.kernel
+@wp.kernel(launch_bounds=(BLOCK, GATHERING))
 def g2p(
     grid: Grid,
     capacity: int,

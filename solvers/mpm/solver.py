@@ -166,8 +166,8 @@ class SolverMPM(Solver):
         if not self.started:
             self._start_affine()
 
-    def _launch(self, name: str, size: int, inputs: list[Any], outputs: list[Any] = [], block_dim: int = 256) -> None:  # noqa: B006
-        self.backend.launch(getattr(self.kernels, name), size, inputs, outputs, block_dim)
+    def _launch(self, name: str, size: int, inputs: list[Any], outputs: list[Any] = []) -> None:  # noqa: B006
+        self.backend.launch(getattr(self.kernels, name), size, inputs, outputs)
 
     def _start_affine(self) -> None:
         """Gather the affine field of the initial velocities: from zero, the first step would be a lossy PIC step.
@@ -233,7 +233,6 @@ class SolverMPM(Solver):
                 self.table,
             ],
             [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, self.fill, pool.fault],
-            block_dim=128,
         )
 
     def grid_step(self) -> None:
@@ -289,7 +288,8 @@ class SolverMPM(Solver):
 
     def prepare(self) -> None:
         if self.scene.changes:
-            wp.load_module(aging, device=self.scene.device)
+            self.scene.crew.load(aging)
+        self.order.prepare()
         self.backend.prepare(self)
         if self.by_block is not None:
             self.by_block.prepare()

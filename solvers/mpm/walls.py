@@ -161,6 +161,17 @@ def near_wall(grid: Grid, node: wp.vec3i):
 
 
 @wp.func
+def in_reach(grid: Grid, node: wp.vec3i):
+    """Whether any particle in front of the walls can ask for a node: one behind a wall at most."""
+    reached = bool(True)
+    for axis in range(3):
+        walled = grid.lower_kind[axis] != PERIODIC
+        if walled and (node[axis] < FIRST - 1 or node[axis] > FIRST + grid.cells[axis] + 1):
+            reached = False
+    return reached
+
+
+@wp.func
 def plane_share(grid: Grid, node: wp.vec3i):
     """What the mass of a node on a wall must be multiplied by: only half (a quarter, ...) of its cell is inside."""
     share = float(1.0)

@@ -14,6 +14,7 @@ from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.crew import index_of, raise_fault
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import PERIODIC, SLIP, STICK, Box, Phase, Scene, is_solid
+from fluidbench.native.vector_access import joined
 
 from ..backends import Backend
 from ..bind import warp_func
@@ -33,6 +34,7 @@ DAMPED = wp.constant(
 )  # share of a Jacobi step: 26 / 3 bonds pull each way, so that 3 / 26 is stable for all modes
 GELLED = wp.constant(0.5)  # degree of cure from which bonds hold
 FAULT_BONDS = 8
+TEAM = 8  # threads of a GPU that share a particle's bonds
 LOOSE, FRESH, BOUND = wp.constant(0), wp.constant(1), wp.constant(2)
 
 
@@ -166,6 +168,7 @@ def bind(
 @wp.kernel
 def stretch(
     share: wp.vec3i,
+    threads: int,
     box: Box,
     spacing: float,
     sweep: int,
@@ -181,11 +184,15 @@ def stretch(
     # outputs
     correction: wp.array(dtype=wp.vec3),
 ):
-    """One damped Jacobi sweep over all bonds (eq. 18 of the paper); both ends of a bond compute the same multiplier."""
-    i = index_of(share, wp.tid())
+    """One damped Jacobi sweep over all bonds (eq. 18 of the paper); both ends of a bond compute the same multiplier.
+    On a GPU `threads` share a particle."""
+    thread = index_of(share, wp.tid())
+    i = thread / threads
+    member = thread - i * threads
     world = i / capacity
-    if i - world * capacity < count[world]:
-        shift = wp.vec3(0.0, 0.0, 0.0)
+    active = i - world * capacity < count[world]
+    shift = wp.vec3(0.0, 0.0, 0.0)
+    if active:
         phase = phases[world, phase_of[i]]
         h = dt[world]
         own = float(0.0)
@@ -193,7 +200,7 @@ def stretch(
             own = 1.0 / mass[i]
         x = position[i]
         slots = bonds.number.shape[0]
-        for k in range(bonds.number[i]):
+        for k in range(member, bonds.number[i], threads):
             at = k * slots + i
             entry = bonds.partner[at]
             j = entry & INDEX_MASK
@@ -211,6 +218,9 @@ def stretch(
             step = -DAMPED * (length - rest + compliance * before) / (own + other + compliance)
             bonds.multiplier[at] = before + step
             shift += (own * step / wp.max(length, 1.0e-9)) * r
+    for axis in range(3):
+        shift[axis] = joined(shift[axis], threads)
+    if active and member == 0:
         correction[i] = shift
 
 
@@ -279,6 +289,7 @@ class Network:
     def __init__(self, scene: Scene, pool: Pool, backend: Backend, kernels: SimpleNamespace) -> None:
         self.scene, self.pool, self.backend, self.kernels = scene, pool, backend, kernels
         self.bonds = Bonds()
+        self.threads = TEAM if backend.name == "warp" and not scene.device.is_cpu else 1
         with wp.ScopedDevice(scene.device):
             self.bonds.number = wp.zeros(pool.size, dtype=int)
             self.bonds.partner = wp.zeros(pool.size * ROOM, dtype=int)
@@ -306,8 +317,9 @@ class Network:
         pool, scene = self.pool, self.scene
         self.backend.launch(
             self.kernels.stretch,
-            pool.size,
+            pool.size * self.threads,
             [
+                self.threads,
                 scene.box,
                 scene.spacing,
                 sweep,

@@ -134,6 +134,7 @@ def bind(
 
 @ti.kernel
 def stretch(
+    threads: int,
     box: BoxT,
     spacing: float,
     sweep: int,

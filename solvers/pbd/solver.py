@@ -21,7 +21,6 @@ from .. import aging
 from ..backends import backend_of
 from ..constitutive import STRETCHED
 from ..neighbours import crowded, neighbours_of, side_by_side
-from ..pairs import BLOCK
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
 from ..smoothing import spiky
@@ -283,7 +282,7 @@ class SolverPBD(Solver):
     def _over_pairs(self, kernel: Any, rows: wp.array, data: Any) -> None:
         lists = self.neighbours
         common = [self.num, self.scene.box, lists.lists, *self._active()]
-        self.backend.launch(kernel, lists.work, [*common, rows, data], block_dim=BLOCK)
+        self.backend.launch(kernel, lists.work, [*common, rows, data])
 
     def multipliers(self) -> None:
         self._over_pairs(self.kernels.multipliers, self.places, self.constraining)
@@ -343,8 +342,9 @@ class SolverPBD(Solver):
 
     def prepare(self) -> None:
         if self.scene.changes:
-            wp.load_module(aging, device=self.scene.device)
+            self.scene.crew.load(aging)
         self.neighbours.prepare()
+        self.order.prepare()
         self.backend.prepare(self)
 
     def carried(self) -> dict[str, Any]:

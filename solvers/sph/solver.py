@@ -22,7 +22,6 @@ from .. import aging
 from ..backends import backend_of
 from ..constitutive import STRETCHED
 from ..neighbours import crowded, neighbours_of, side_by_side
-from ..pairs import BLOCK
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
 from ..smoothing import wendland, wendland_slope
@@ -252,7 +251,7 @@ class SolverSPH(Solver):
     def _over_pairs(self, kernel: Any, rows: wp.array, data: Any) -> None:
         lists = self.neighbours
         common = [self.num, self.scene.box, lists.lists, self.pool.capacity, self.pool.count]
-        self.backend.launch(kernel, lists.work, [*common, rows, data], block_dim=BLOCK)
+        self.backend.launch(kernel, lists.work, [*common, rows, data])
 
     def strain(self) -> None:
         self._over_pairs(self.kernels.strain, self.matter, self.straining)
@@ -285,8 +284,9 @@ class SolverSPH(Solver):
 
     def prepare(self) -> None:
         if self.scene.changes:
-            wp.load_module(aging, device=self.scene.device)
+            self.scene.crew.load(aging)
         self.neighbours.prepare()
+        self.order.prepare()
         self.backend.prepare(self)
 
     def carried(self) -> dict[str, Any]:

@@ -59,6 +59,7 @@ class Pair:
             bonds.stretch,
             2,
             [
+                1,
                 self.box,
                 D,
                 sweep,
