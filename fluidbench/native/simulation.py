@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import warp as wp
@@ -79,7 +79,7 @@ class Simulation(Session):
         self.aged = 0  # ticks that this process has run
         slots = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
         self._identity, self._order = (wp.array(slots, dtype=int, device=self.scene.device) for _ in range(2))
-        self._sorts = False  # whether the solver has an order
+        self._sorts: bool | None = None  # whether the solver has an order; not known before it was asked
         self._planned: tuple[float, float, Plan] | None = None  # speed, end of its validity [s], plan
         self.posted: Letter | None = None  # a reading on its way from a GPU
         self.heard = Vital(self.speed, 0.0, 0.0, None)
@@ -284,12 +284,12 @@ class Simulation(Session):
 
     def _sort(self) -> None:
         """Put side by side in memory what is side by side, if the solver has an order for it."""
-        if not self._use_graphs or self.aged == 0:
+        if not self._use_graphs or self._sorts is None:
             self._sorts = (keys := self.solver.sort_keys()) is not None
             if keys is not None:
                 self.reorder(keys)
         elif self._sorts:
-            self.scene.crew.run("sort", lambda: self.reorder(self.solver.sort_keys()))
+            self.scene.crew.run("sort", lambda: self.reorder(cast(wp.array, self.solver.sort_keys())))
             self.pool.stale = True
 
     def reorder(self, keys: wp.array) -> None:

@@ -38,7 +38,7 @@ def report(rows: Sequence[Row], target: Target) -> Report:
         lines,
         [_speeds(rows), _published()],
         pd.DataFrame(rows),
-        [_plot(sound)] if sound else [],
+        _plots(sound) if sound else [],
         failures=[f"{r['method']}, {r['material']}, {r['particles']:,}: {r['reason']}" for r in rows if "reason" in r],
     )
 
@@ -81,17 +81,29 @@ def _published() -> Table:
     return table
 
 
-def _plot(rows: Sequence[Row]) -> Plot:
-    traces = []
+def _plots(rows: Sequence[Row]) -> list[Plot]:
+    """Cost by size, with what memory allows dashed in, and memory beside it."""
+    cost, limits, memory = [], [], []
     for method, material in dict.fromkeys((row["method"], row["material"]) for row in rows):
         own = [row for row in rows if (row["method"], row["material"]) == (method, material)]
-        traces.append(
-            Trace(
-                f"{method} ({material})",
-                [row["particles"] for row in own],
-                [row["particle_substeps_per_s"] for row in own],
-                "line+points",
-                colour(method if material == rows[0]["material"] else f"{method} ({material})"),
-            )
+        shade = colour(method if material == rows[0]["material"] else f"{method} ({material})")
+        sizes = [row["particles"] for row in own]
+        spent = [1e9 / row["particle_substeps_per_s"] for row in own]
+        cost.append(Trace(f"{method} ({material})", sizes, spent, "line+points", shade))
+        memory.append(
+            Trace(f"{method} ({material})", sizes, [row["bytes_per_particle"] for row in own], "line+points", shade)
         )
-    return Plot("speed", "Speed by size", "particles", "particle-substeps/s", traces, log=True)
+        if all(row["limit_substeps_per_s"] is not None for row in own):
+            least = [1e9 / (row["limit_substeps_per_s"] * row["particles"]) for row in own]
+            limits.append(Trace("", sizes, least, "dashed", shade))
+    return [
+        Plot(
+            "cost_by_size",
+            "Cost by size; dashed: if a substep only moved its bytes",
+            "particles",
+            "ns per particle and substep",
+            [*cost, *limits],
+            log=True,
+        ),
+        Plot("memory_by_size", "Memory by size", "particles", "bytes a particle", memory, log=True),
+    ]

@@ -77,11 +77,11 @@ def measure_speed(task: Task) -> dict[str, Any]:
         bounds = method.bounds(scenario, config, scenario.reference_speed)
         dt = min(bound.dt for bound in bounds) if bounds else scenario.schedule[0]
         session.begin()
-        session.march(dt, 2)
+        batch = 1 if target.device == "cpu" else BATCH
+        session.march(dt, batch)  # records it
     except (UserError, NotImplementedError) as reason:
         return named | {"reason": str(reason).splitlines()[0], "refused": True}
     wp.synchronize()
-    batch = 1 if target.device == "cpu" else BATCH
     substeps, wall, cpu = 0, time.perf_counter(), time.process_time()
     while substeps == 0 or time.perf_counter() - wall < task["seconds"]:
         session.march(dt, batch)

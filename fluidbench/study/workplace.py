@@ -85,7 +85,8 @@ class Workplace:
                 raise UserError(f"no option {quoted(name)}{suggestion(name, Options.__annotations__)}")
         limit = options.get("wall_limit", wall_limit)
         require_number(limit, "wall_limit", 1e-3)
-        threads = 1 if options.get("threads") is None else options["threads"]
+        given = options.get("threads")
+        threads = 1 if given is None else given
         require_number(threads, "threads", 1, whole=True)
         if options.get("jobs") is not None:
             require_number(options.get("jobs"), "jobs", 1, whole=True)
