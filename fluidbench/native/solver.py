@@ -40,14 +40,16 @@ class Solver(Method):
         """Enqueue the passes that advance every particle by `scene.dt`.
 
         No host synchronisation, no allocation and no branch on device data: with Warp the whole call is captured as a
-        graph.
+        graph, once for each thread that shares the work. A method that `shares_threads` launches through
+        `scene.crew.launch` alone; any other may use `wp.launch`.
         """
 
     def prepare(self) -> None:
         """Compile the kernels; timed apart from the run."""
 
     def refresh(self) -> None:
-        """Called between substeps, outside any graph, after particles appeared, moved in memory or were moved."""
+        """Enqueue what must follow when particles have appeared, moved in memory or were moved: between substeps, the
+        first time outside any graph, later recorded like `substep`."""
 
     def carried(self) -> dict[str, Any]:
         """Arrays beyond the pool's that later substeps depend on, by name: what a checkpoint must hold."""
@@ -57,15 +59,15 @@ class Solver(Method):
         """Called after the pool and what is `carried` were restored from a checkpoint, before the next substep."""
 
     def harden(self, due: Any) -> None:
-        """Move every particle to its due row of the phase table (int, shape (worlds * capacity,)), between substeps.
+        """Enqueue: move every particle to its due row of the phase table (int, shape (worlds * capacity,)), between substeps.
 
         Position, velocity and stress stay as they are: curing does no work. Required of methods that can CURE.
         """
         raise NotImplementedError(f"{self.name} cannot cure")
 
     def sort_keys(self) -> Any | None:
-        """int64 keys that put neighbours side by side, in the first half of an array of twice the pool's size; None
-        to keep the order."""
+        """int64 keys that put neighbours side by side, in the first half of an array of twice the pool's size, once
+        what was enqueued is done; None, always, to keep the order. Recorded like `substep`."""
         return None
 
     @abstractmethod
