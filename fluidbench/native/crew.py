@@ -132,13 +132,6 @@ class Crew:
             self._address = _give_way()
             wp.load_module(device=device)
 
-    def prepare(self) -> None:
-        """Compile what Warp itself needs for decisions on a GPU, lest the first recording pay for it."""
-        if not self.device.is_cpu:
-            flag = wp.zeros(1, dtype=int, device=self.device)
-            with wp.ScopedCapture(device=self.device):
-                wp.capture_if(flag, on_true=lambda: self.launch(put, 1, [0, flag]))
-
     @property
     def leading(self) -> bool:
         """Whether what is launched now is the part of the first thread."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -18,11 +18,11 @@ from ..registry import get_method
 from ..scenario import Scenario
 from ..scenario.layout import capacity_of, emitted, generations
 from ..scenario.numerics import configure
-from . import clock, crew, health, pool
+from . import clock, crew, health, pool, sorting
 from .device import CountedLaunches
 from .health import Health, Letter, Vital
 from .pool import Pool
-from .process import contact, curing, emission, expansion
+from .process import births, contact, curing, emission, expansion
 from .process.contact import Contact
 from .process.curing import Curing
 from .process.emission import Emission
@@ -30,8 +30,8 @@ from .process.expansion import Growing
 from .process.placement import Placement
 from .scene import Scene
 from .solver import Solver
+from .sorting import Sorting
 
-SORT_TICKS = 32  # ticks between reorderings of the pool, at most
 LOOK_TICKS = 8  # ticks between looks on a GPU, where looking waits for it
 
 
@@ -77,14 +77,12 @@ class Simulation(Session):
         self.done = 0
         self.unseen = True  # whether somebody else may have changed the particles since the last audit
         self.aged = 0  # ticks that this process has run
-        slots = np.tile(np.arange(self.pool.size, dtype=np.int32), 2)
-        self._identity, self._order = (wp.array(slots, dtype=int, device=self.scene.device) for _ in range(2))
-        self._sorts: bool | None = None  # whether the solver has an order; not known before it was asked
         self._planned: tuple[float, float, Plan] | None = None  # speed, end of its validity [s], plan
         self.posted: Letter | None = None  # a reading on its way from a GPU
         self.heard = Vital(self.speed, 0.0, 0.0, None)
         self.substep_launches = self.process_launches = 0  # of a substep; of the processes a tick, at most
         self._use_graphs = graphs and target.backend == DEFAULT_BACKEND
+        self.sorting = Sorting(self.pool, self.solver, self._use_graphs)
 
     @property
     def now(self) -> float:
@@ -106,9 +104,9 @@ class Simulation(Session):
         self.solver.prepare()
         for module in (clock, crew, health, pool):
             self.scene.crew.load(module)
-        self.scene.crew.prepare()
-        parts = {emission: self.emission, curing: self.curing, expansion: self.growing, contact: self.contact}
-        for module in (module for module, part in parts.items() if part is not None):
+        parts = [(emission, self.emission), (curing, self.curing), (contact, self.contact)]
+        parts += [(module, self.growing) for module in (expansion, births)]
+        for module in (module for module, part in parts if part is not None):
             self.scene.crew.load(module)
 
     def begin(self) -> Vital:
@@ -133,8 +131,8 @@ class Simulation(Session):
         """One tick: feed, plan, and run its substeps. Nothing here waits for a GPU, but where matter gives birth."""
         if not self.scene.device.is_cpu and self.done % LOOK_TICKS == 0:
             self._exchange()
-        if self.done % SORT_TICKS == 0:
-            self._sort()
+        if self.done % sorting.EVERY == 0:
+            self.sorting.sort()
         self.scene.clock.show(self.done)
         feeding = self._expect()
         steps = self._plan()
@@ -281,26 +279,6 @@ class Simulation(Session):
     @property
     def capacity(self) -> int:
         return self.pool.size
-
-    def _sort(self) -> None:
-        """Put side by side in memory what is side by side, if the solver has an order for it."""
-        if not self._use_graphs or self._sorts is None:
-            self._sorts = (keys := self.solver.sort_keys()) is not None
-            if keys is not None:
-                self.reorder(keys)
-        elif self._sorts:
-            self.scene.crew.run("sort", lambda: self.reorder(cast(wp.array, self.solver.sort_keys())))
-            self.pool.stale = True
-
-    def reorder(self, keys: wp.array) -> None:
-        """Enqueue: the pool in the order of a solver's keys."""
-
-        def sort() -> None:
-            wp.copy(self._order, self._identity)
-            wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
-
-        self.scene.crew.alone(sort)
-        self.pool.permute(self._order)
 
     def _substep(self) -> None:
         """Everything of one substep, as it is captured."""

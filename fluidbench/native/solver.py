@@ -59,7 +59,7 @@ class Solver(Method):
         """Called after the pool and what is `carried` were restored from a checkpoint, before the next substep."""
 
     def harden(self, due: Any) -> None:
-        """Enqueue: move every particle to its due row of the phase table (int, shape (worlds * capacity,)), between substeps.
+        """Enqueue: every particle to its due row of the phase table (int, (worlds * capacity,)); between substeps.
 
         Position, velocity and stress stay as they are: curing does no work. Required of methods that can CURE.
         """

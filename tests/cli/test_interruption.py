@@ -63,7 +63,7 @@ def killed(command, out, rng, times):
         deadline = time.monotonic() + 120
         while process.poll() is None and time.monotonic() < deadline and not list(out.glob("runs/*/checkpoint.npz")):
             time.sleep(0.01)
-        time.sleep(rng.uniform(0.0, 0.8))
+        time.sleep(rng.uniform(0.0, 0.3))
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
         process.communicate()

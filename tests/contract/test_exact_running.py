@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fluidbench.method.verdict import Verdict
-from fluidbench.native import simulation
+from fluidbench.native import sorting
 from fluidbench.native.simulation import Simulation
 from fluidbench.runs import drive as loop
 from fluidbench.runs.drive import Drive, Outcome
@@ -100,7 +100,7 @@ def test_every_32nd_tick_sorts_the_pool():
             return self.kept
 
     sim, turned = falling(Sorting, duration=8.125), []
-    assert sim.ticks == 65 and simulation.SORT_TICKS == 32
+    assert sim.ticks == 65 and sorting.EVERY == 32
     for _ in range(65):
         before = sim.pool.origin.numpy()[:8].tolist()
         sim.advance_tick()
@@ -116,9 +116,9 @@ def test_the_order_of_a_sort_is_that_of_the_keys():
     keys = np.zeros(2 * sim.pool.size, np.int64)
     keys[: sim.pool.size] = np.arange(sim.pool.size)
     keys[:3] = [2, 1, 0]
-    sim.reorder(wp.array(keys, dtype=wp.int64))
+    sim.sorting.reorder(wp.array(keys, dtype=wp.int64))
     assert sim.pool.origin.numpy()[:5].tolist() == [2, 1, 0, 3, 4]
-    sim.reorder(wp.array(keys, dtype=wp.int64))
+    sim.sorting.reorder(wp.array(keys, dtype=wp.int64))
     assert sim.pool.origin.numpy()[:5].tolist() == [0, 1, 2, 3, 4]
 
 

@@ -1,0 +1,277 @@
+"""The transfers of MPM on the CPU, block by block.
+
+Particles scatter into the patch of their home, which no other thread touches and which stays in the nearest cache; the
+patches that overlap at a node are then added up in one order, whatever the number of threads. The gather reads a patch
+in the same way, once it holds the velocities.
+"""
+
+import functools
+
+import warp as wp
+
+from fluidbench.method.frame import CARRIED
+from fluidbench.native.crew import drawn, index_of
+from fluidbench.native.scene import Phase
+
+from ..bind import rebound
+from .grid import Grid, activate_stencil, first_node
+from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, place_in_patch
+from .particle import Feedback, affine_of, inertia, moved, spline, strained, taken
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+SCATTERED, GATHERED = wp.constant(0), wp.constant(1)  # whose turn it is
+EXPANDS = False  # whether rest densities may differ, see `transfers`
+
+
+@wp.func_native(
+    snippet="""
+#if !defined(__CUDA_ARCH__)
+    typedef float quad __attribute__((vector_size(16), aligned(4)));
+    quad* const lowest = (quad*)&patch.data[at];
+    const quad own = { momentum[0], momentum[1], momentum[2], mass };
+    const quad ax = { a.data[0][0], a.data[1][0], a.data[2][0], 0.0f };
+    const quad ay = { a.data[0][1], a.data[1][1], a.data[2][1], 0.0f };
+    const quad az = { a.data[0][2], a.data[1][2], a.data[2][2], 0.0f };
+    for (unsigned o = 0; o < 3; ++o)
+        for (unsigned q = 0; q < 3; ++q) {
+            quad* const node = lowest + (o * 6 + q) * 6;
+            const quad row = own + (o * 1.0f) * ax + (q * 1.0f) * ay;
+            const float w = wx[o] * wy[q];
+            node[0] += (w * wz[0]) * row;
+            node[1] += (w * wz[1]) * (row + az);
+            node[2] += (w * wz[2]) * (row + az + az);
+        }
+#endif
+"""
+)
+def add_to_nodes(
+    patch: wp.array(dtype=wp.vec4),
+    at: int,
+    wx: wp.vec3,
+    wy: wp.vec3,
+    wz: wp.vec3,
+    momentum: wp.vec3,
+    mass: float,
+    a: wp.mat33,
+):
+    """patch[at + 36 o + 6 q + r] += wx[o] wy[q] wz[r] (momentum + a (o, q, r), mass), four floats at a time."""
+    ...
+
+
+@wp.func_native(
+    snippet="""
+#if !defined(__CUDA_ARCH__)
+    typedef float quad __attribute__((vector_size(16), aligned(4)));
+    const quad* const lowest = (const quad*)&patch.data[at];
+    quad v = {}, x = {}, y = {}, z = {};
+    for (unsigned o = 0; o < 3; ++o) {
+        quad plane = {};
+        for (unsigned q = 0; q < 3; ++q) {
+            const quad* const node = lowest + (o * 6 + q) * 6;
+            const quad near = wz[1] * node[1], far = wz[2] * node[2];
+            const quad row = wz[0] * node[0] + near + far;
+            const float w = wx[o] * wy[q];
+            plane += wy[q] * row;
+            y += (w * (q * 1.0f - f[1])) * row;
+            z += w * (near + far + far - f[2] * row);
+        }
+        v += wx[o] * plane;
+        x += (wx[o] * (o * 1.0f - f[0])) * plane;
+    }
+    return wp::mat_t<4, 4, wp::float32>(
+        v[0], v[1], v[2], v[3], x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], z[0], z[1], z[2], z[3]
+    );
+#else
+    return wp::mat_t<4, 4, wp::float32>();
+#endif
+"""
+)
+def taken_from_nodes(
+    patch: wp.array(dtype=wp.vec4), at: int, wx: wp.vec3, wy: wp.vec3, wz: wp.vec3, f: wp.vec3
+) -> wp.mat44:
+    """Row 0: the sum of w patch over the 27 nodes from `at` on; rows 1 to 3: of w patch d, d being the distance of a
+    node from the point f along x, y and z, in cells."""
+    ...
+
+
+def scatter(
+    share: wp.vec3i,
+    grid: Grid,
+    capacity: int,
+    homes: Homes,
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+    affine: wp.array(dtype=wp.mat33),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    # outputs
+    volume_ratio: wp.array(dtype=float),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+):
+    """Strain and stress of each particle, then momentum and mass to the patch of its home."""
+    h = drawn(homes.turn, SCATTERED)
+    while h < homes.total[0]:
+        start = h * PATCH
+        for k in range(PATCH):
+            homes.patch[start + k] = wp.vec4(0.0, 0.0, 0.0, 0.0)
+            if wp.static(EXPANDS):
+                homes.fill[start + k] = 0.0
+        for member in range(homes.first[h], homes.first[h] + homes.number[h]):
+            p = homes.members[member]
+            world = p / capacity
+            phase = phases[world, phase_of[p]]
+            m = inertia(mass[p], held[p])
+            a = strained(
+                grid, dt[world], phase, p, True, affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear
+            )
+            base = first_node(grid, position[p])
+            f = wp.cw_mul(position[p] - grid.origin, grid.inv_dx) - wp.vec3(
+                float(base[0]), float(base[1]), float(base[2])
+            )
+            wx0, wx1, wx2 = spline(f[0])
+            wy0, wy1, wy2 = spline(f[1])
+            wz0, wz1, wz2 = spline(f[2])
+            wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+            momentum = m * velocity[p] - a * f
+            at = start + place_in_patch(grid, base)
+            add_to_nodes(homes.patch, at, wx, wy, wz, momentum, m, a)
+            if wp.static(EXPANDS):
+                for o in range(3):
+                    for q in range(3):
+                        for r in range(3):
+                            k = at + (o * SIDE + q) * SIDE + r
+                            homes.fill[k] = homes.fill[k] + wx[o] * wy[q] * wz[r] * volume[p] * phase.density
+        h = drawn(homes.turn, SCATTERED)
+
+
+def add_up(
+    share: wp.vec3i,
+    lanes: int,
+    grid: Grid,
+    active: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    table: wp.array(dtype=int),
+    homes: Homes,
+    # outputs
+    raw: wp.array(dtype=wp.vec4),
+    fill: wp.array(dtype=wp.vec4),
+):
+    """Momentum and mass of every node, emptied before: the sum over all patches that hold it."""
+    slot = index_of(share, wp.tid())
+    if slot == 0:
+        homes.turn[SCATTERED] = 0
+        homes.turn[GATHERED] = 0
+    while slot < wp.min(active[0], block_of.shape[0]):
+        world = block_of[slot] / grid.blocks_per_world
+        block = coordinates(grid, block_of[slot] - world * grid.blocks_per_world)
+        for corner in range(8):
+            b, node, place, size = neighbour(grid, block, corner, 0)
+            h = int(NOWHERE)
+            if b >= 0:
+                other = table[b + world * grid.blocks_per_world] - 1
+                if other >= 0:
+                    h = homes.of_slot[other]
+            if h >= 0:
+                for i in range(size[0]):
+                    for j in range(size[1]):
+                        to = slot * 64 + ((node[0] + i) << 4) + ((node[1] + j) << 2) + node[2]
+                        at = h * PATCH + ((place[0] + i) * SIDE + place[1] + j) * SIDE + place[2]
+                        for k in range(size[2]):
+                            raw[to + k] = raw[to + k] + homes.patch[at + k]
+                            if wp.static(EXPANDS):
+                                fill[to + k] = fill[to + k] + wp.vec4(0.0, 0.0, 0.0, homes.fill[at + k])
+        slot += lanes
+
+
+@wp.kernel
+def gather(
+    share: wp.vec3i,
+    grid: Grid,
+    capacity: int,
+    homes: Homes,
+    dt: wp.array(dtype=float),
+    moving: wp.array(dtype=wp.vec4),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    feedback: Feedback,
+    # outputs
+    position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
+    affine: wp.array(dtype=wp.mat33),
+    volume_ratio: wp.array(dtype=float),
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
+    """Velocity and affine velocity field of each particle from the patch of its home, then its motion."""
+    h = drawn(homes.turn, GATHERED)
+    while h < homes.total[0]:
+        start = h * PATCH
+        own = block_of[homes.slot[h]]
+        world = own / grid.blocks_per_world
+        block = coordinates(grid, own - world * grid.blocks_per_world)
+        for corner in range(8):
+            b, node, place, size = neighbour(grid, block, corner, 1)
+            slot = int(NOWHERE)
+            if b >= 0:
+                slot = table[b + world * grid.blocks_per_world] - 1
+            if slot >= 0:
+                for i in range(size[0]):
+                    for j in range(size[1]):
+                        of = slot * 64 + ((node[0] + i) << 4) + ((node[1] + j) << 2) + node[2]
+                        at = start + ((place[0] + i) * SIDE + place[1] + j) * SIDE + place[2]
+                        for k in range(size[2]):
+                            homes.patch[at + k] = moving[of + k]
+        for member in range(homes.first[h], homes.first[h] + homes.number[h]):
+            p = homes.members[member]
+            x = position[p]
+            base = first_node(grid, x)
+            v = velocity[p]
+            if held[p] != CARRIED:  # what is clamped strains, but keeps its velocity
+                at = start + place_in_patch(grid, base)
+                f = wp.cw_mul(x - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
+                wx0, wx1, wx2 = spline(f[0])
+                wy0, wy1, wy2 = spline(f[1])
+                wz0, wz1, wz2 = spline(f[2])
+                wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+                sums = taken_from_nodes(homes.patch, at, wx, wy, wz, f)
+                affine[p] = affine_of(grid, sums)
+                v = taken(
+                    p,
+                    wp.vec3(sums[0, 0], sums[0, 1], sums[0, 2]),
+                    sums[0, 3],
+                    phases[world, phase_of[p]],
+                    dt[world],
+                    feedback,
+                    held,
+                    velocity,
+                    volume_ratio,
+                )
+            after = moved(grid, x, v, dt[world], p, position, velocity, fault)
+            if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
+                activate_stencil(grid, world, after, table, block_of, active, fault)
+                if home_of(grid, after) != home_of(grid, base):
+                    homes.outdated[0] = 1
+        h = drawn(homes.turn, GATHERED)
+
+
+@functools.cache
+def transfers(expands: bool) -> tuple[wp.Kernel, wp.Kernel]:
+    """`scatter` and `add_up`, compiled for matter that expands or does not."""
+    return tuple(
+        wp.kernel(
+            rebound(law, {"EXPANDS": expands}),
+            name=f"{law.__name__}_{'expanding' if expands else 'plain'}",
+            module="unique",
+            module_options={"fast_math": True, "enable_backward": False},
+        )
+        for law in (scatter, add_up)
+    )
