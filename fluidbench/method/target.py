@@ -39,6 +39,11 @@ class Target:
         return "".join(f" {name} {value}" for name, value in given.items() if value != usual[name])
 
     @property
+    def alone(self) -> str:
+        """The same for `fluidbench run`, which takes all cores by itself."""
+        return self.options + (" --threads 1" if self.device == "cpu" and self.threads == 1 else "")
+
+    @property
     def other(self) -> "Target | None":
         """The other backend on this device, on one thread; None where it is not installed."""
         backend = next(b for b in BACKENDS if b != self.backend)

@@ -59,7 +59,7 @@ class Clock:
     def show(self, ticks: int) -> None:
         """Make the row after so many ticks the present one."""
         if self.first < 0 or not self.first <= ticks < self.first + ROWS:
-            self.first = ticks
+            self.first, self.hours.tick = ticks, self.tick
             self._write(self.tick * np.arange(ticks, ticks + ROWS + 1, dtype=float))
         self._turn_to(ticks - self.first)
 

@@ -116,7 +116,7 @@ class Simulation(Session):
         return self.look()
 
     def advance(self, until: float) -> Steps:
-        """Whole ticks, to the first that ends at `until` [s] or later."""
+        """Whole ticks, to the first that ends at `until` [s] or later, or at which a GPU is known to have broken."""
         taken = Steps()
         for _ in range(max(1, math.ceil((until - self.now) / self.tick - 1e-6))):
             plan = self.advance_tick()
@@ -125,10 +125,12 @@ class Simulation(Session):
             taken.particle_substeps += plan.substeps * active
             taken.peak_particles = max(taken.peak_particles, active)
             taken.binding[plan.binding.name] = taken.binding.get(plan.binding.name, 0.0) + self.tick
+            if self.heard.complaint is not None:
+                break
         return taken
 
     def advance_tick(self) -> Plan:
-        """One tick: feed, plan, and run its substeps. Nothing here waits for a GPU, but where matter gives birth."""
+        """One tick: feed, plan, and run its substeps. A GPU is never idle for it, but where matter gives birth."""
         if not self.scene.device.is_cpu and self.done % LOOK_TICKS == 0:
             self._exchange()
         if self.done % sorting.EVERY == 0:
@@ -235,8 +237,10 @@ class Simulation(Session):
         return self.look() if self.scene.device.is_cpu else self.heard
 
     def _go_by(self, vital: Vital) -> None:
-        """Plan for what was seen."""
-        self.heard, self.speed = vital, max(vital.speed, 0.1 * self.scenario.reference_speed)
+        """Plan for what was seen, if it is matter's."""
+        self.heard = vital
+        if vital.complaint is None:
+            self.speed = max(vital.speed, 0.1 * self.scenario.reference_speed)
 
     def _exchange(self) -> None:
         """On a GPU, which is not to wait for the host: send for what is there now, and go by what came of the last

@@ -99,18 +99,18 @@ def cost(outcome: Outcome, session: Session, total: float) -> Cost:
     bytes_used = sum(session.footprint().values())
     device = session.peak_device_bytes()
     return Cost(
-        simulated_s=outcome.time,
+        simulated_s=outcome.simulated,
         wall_s=outcome.wall,
         cpu_s=outcome.cpu,
         prepare_s=outcome.prepare_wall,
         total_s=total,
         substeps=outcome.substeps,
-        mean_dt_s=outcome.time / max(outcome.substeps, 1),
+        mean_dt_s=outcome.simulated / max(outcome.substeps, 1),
         steps_per_s=outcome.substeps / wall,
         particle_substeps_per_s=outcome.particle_substeps / wall,
         particle_substeps_per_cpu_s=outcome.particle_substeps / cpu,
-        wall_per_simulated_s=wall / max(outcome.time, 1e-12),
-        simulated_to_real=outcome.time / wall,
+        wall_per_simulated_s=wall / max(outcome.simulated, 1e-12),
+        simulated_to_real=outcome.simulated / wall,
         peak_particles=outcome.peak_particles,
         bytes_per_particle=bytes_used / max(session.capacity, 1),
         peak_memory_MiB=peak_memory() / 2**20,

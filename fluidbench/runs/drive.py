@@ -33,7 +33,8 @@ class Outcome:
 
     verdict: Verdict = Verdict.COMPLETED
     reason: str = ""
-    time: float = 0.0
+    time: float = 0.0  # that the verdict is of
+    simulated: float = 0.0  # that was paid for: a GPU may have gone on a little before it was known to have broken
     substeps: int = 0
     particle_substeps: int = 0
     wall: float = 0.0
@@ -86,6 +87,7 @@ class Drive:
             self.leg()
             if self.checkpoints is not None and self.checkpoints.due() and outcome.verdict is Verdict.COMPLETED:
                 self.checkpoints.write(outcome)
+        outcome.simulated = session.now
         if outcome.verdict is Verdict.COMPLETED:
             outcome.time = session.now
             if broken := session.conclude():
@@ -113,9 +115,12 @@ class Drive:
             steps = session.advance(until)
         except OutOfCapacity as error:
             outcome.end(Verdict.OUT_OF_CAPACITY, str(error), session.now)
+            if (vital := session.look()).complaint:  # what has broken asks for any room
+                self.judge(vital, False)
             return
         at_output = session.now >= output - self.near
-        vital = session.look() if at_output else session.news()
+        saved = self.checkpoints is not None and self.checkpoints.due()  # which waits: on the clock, then
+        vital = session.look() if at_output or saved else session.news()
         if self.camera is not None and session.now >= self.camera.next - self.near:
             self.camera.shoot(session)
         outcome.wall += time.perf_counter() - wall
@@ -135,6 +140,9 @@ class Drive:
             if self.observe is not None and at_output:
                 self.observe(session, vital)
             if late := self.too_slow():
+                if time < session.now - self.near and (now := session.look()).complaint:
+                    self.judge(now, False)  # not late but broken, since the last news
+                    return
                 if self.checkpoints is not None and self.checkpoints.every > 0:
                     self.checkpoints.write(outcome)  # with a larger limit it goes on from here
                 outcome.end(Verdict.TIMEOUT, late, session.now)

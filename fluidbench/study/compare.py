@@ -62,7 +62,7 @@ def compare(
     threads = options.get("threads")
     one = threads if len(languages) == 1 else 1
     place = Workplace.of({**options, "backend": languages[0], "threads": one}, WALL_LIMIT, names)
-    if threads is None and len(names) == repeats == len(languages) == 1:
+    if threads is None and place.executor is None and len(names) == repeats == len(languages) == 1:
         threads = threads_alone(resolved, names[0], place.target)
     targets = targets_of(place.target.device, languages, 1 if threads is None else threads)
     if not verb.replace("-", "").replace("_", "").isalnum():

@@ -58,7 +58,7 @@ def _findings(
     lines = [f"Tolerance {100 * tolerance:.3g} %; budget: {_budget(budget, pace)}."]
     lines.append(f"Recommended: {_words(best)}." + (f" But {why}." if why else ""))
     lines.append(
-        f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}{best.run.target.options}"
+        f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}{best.run.target.alone}"
     )
     finer = [c for c in chosen.candidates if c.error <= best.error / 2]
     faster = [c for c in chosen.candidates if c.wall <= best.wall / 2]

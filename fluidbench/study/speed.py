@@ -88,8 +88,9 @@ def measure_speed(task: Task) -> dict[str, Any]:
         wp.synchronize()
         substeps += batch
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    if complaint := session.look().complaint:
-        return named | {"reason": complaint}
+    vital = session.look()
+    if broken := vital.complaint or vital.shortage:
+        return named | {"reason": broken}
     ceilings, moved = bandwidth(target.device), session.traffic()
     least = None if moved is None else sum(moved[where] / ceilings[where] for where in ceilings)
     return named | {

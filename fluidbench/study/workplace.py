@@ -184,25 +184,27 @@ def methods_of(
 
 
 def target_of(device: str, backend: str, threads: int) -> Target:
-    """Where to run; raises UserError unless the device exists and the backend is installed."""
+    """Where to run; raises UserError unless the device exists and the backend is installed, and for threads that it
+    would not use."""
     if backend not in BACKENDS:
         raise UserError(f"backend: no {quoted(backend)}{suggestion(backend, list(BACKENDS))}")
     if find_spec(backend) is None:
         raise UserError(f"the backend {backend} is not installed: pip install {BACKENDS[backend]}")
+    require_number(threads, "threads", 1, whole=True)
     if threads > 4 * cores():
         raise UserError(f"{threads} threads are more than this machine's {cores()} cores can be shared among")
     _check_device(device)
-    return Target(device, backend, threads)
-
-
-def one_target(device: str, backend: str, threads: int) -> Target:
-    """`target_of` for a verb with one backend; raises UserError for threads that it would not use."""
-    if "," in backend:
-        raise UserError(f"one backend is wanted here; got {quoted(backend)} (compare takes several)")
-    target = target_of(device, backend, threads)
+    target = Target(device, backend, threads)
     if target.threads != threads:
         raise UserError(f"{threads} threads are for the CPU; a GPU has its own")
     return target
+
+
+def one_target(device: str, backend: str, threads: int) -> Target:
+    """`target_of` for a verb with one backend."""
+    if "," in backend:
+        raise UserError(f"one backend is wanted here; got {quoted(backend)} (compare takes several)")
+    return target_of(device, backend, threads)
 
 
 def targets_of(device: str, backends: Sequence[str], threads: int) -> list[Target]:

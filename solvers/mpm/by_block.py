@@ -20,10 +20,9 @@ class ByBlock:
         self.scene, self.pool, self.launch, self.lanes = scene, pool, scene.crew.launch, scene.crew.threads
         self.scatter, self.add_up = transfers(scene.expands)
         homes = self.homes = Homes()
-        most = max(slots // 2, 64)  # a home's particles reach into two or more blocks, but where they fill them
+        most = slots  # where matter fills the grid nearly every block is a home
         with wp.ScopedDevice(scene.device):
             homes.total, homes.outdated = wp.zeros(1, dtype=int), wp.ones(1, dtype=int)
-            homes.turn = wp.zeros(2, dtype=int)
             homes.slot, homes.first, homes.number = (wp.zeros(most, dtype=int) for _ in range(3))
             homes.members, homes.of_particle = (wp.zeros(pool.size, dtype=int) for _ in range(2))
             homes.of_slot = wp.zeros(slots, dtype=int)
@@ -45,6 +44,7 @@ class ByBlock:
             self.scatter,
             self.lanes,
             [
+                self.lanes,
                 grid,
                 pool.capacity,
                 self.homes,
@@ -80,6 +80,7 @@ class ByBlock:
             gather,
             self.lanes,
             [
+                self.lanes,
                 grid,
                 pool.capacity,
                 self.homes,

@@ -30,7 +30,6 @@ class Homes:
     of_slot: wp.array(dtype=int)
     of_particle: wp.array(dtype=int)  # the slot of its home; NOWHERE for none
     outdated: wp.array(dtype=int)
-    turn: wp.array(dtype=int)  # of a transfer: the next home that no thread has begun with
     patch: wp.array(dtype=wp.vec4)
     fill: wp.array(dtype=float)
 
@@ -115,6 +114,19 @@ def enrol(size: int, homes: Homes, fault: wp.array(dtype=int)):
                 homes.number[h] = homes.number[h] + 1
     homes.total[0] = total
     homes.outdated[0] = 0
+
+
+@wp.func
+def part_of(homes: Homes, lane: int, lanes: int):
+    """The homes of a lane, first and end: as many particles for each, and the same for every pass, so that what a core
+    has at hand stays with it."""
+    total = homes.total[0]
+    members = int(0)
+    if total > 0:
+        members = homes.first[total - 1] + homes.number[total - 1]
+    piece = (members + lanes - 1) / lanes
+    begin = wp.lower_bound(homes.first, 0, total + 1, lane * piece)  # Warp's ends before its end
+    return begin, wp.lower_bound(homes.first, 0, total + 1, (lane + 1) * piece)
 
 
 @wp.func

@@ -10,17 +10,16 @@ import functools
 import warp as wp
 
 from fluidbench.method.frame import CARRIED
-from fluidbench.native.crew import drawn, index_of
+from fluidbench.native.crew import index_of
 from fluidbench.native.scene import Phase
 
 from ..bind import rebound
 from .grid import Grid, activate_stencil, first_node
-from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, place_in_patch
+from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
 from .particle import Feedback, affine_of, inertia, moved, spline, strained, taken
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-SCATTERED, GATHERED = wp.constant(0), wp.constant(1)  # whose turn it is
 EXPANDS = False  # whether rest densities may differ, see `transfers`
 
 
@@ -97,6 +96,7 @@ def taken_from_nodes(
 
 def scatter(
     share: wp.vec3i,
+    lanes: int,
     grid: Grid,
     capacity: int,
     homes: Homes,
@@ -115,8 +115,8 @@ def scatter(
     elastic_shear: wp.array(dtype=wp.vec3),
 ):
     """Strain and stress of each particle, then momentum and mass to the patch of its home."""
-    h = drawn(homes.turn, SCATTERED)
-    while h < homes.total[0]:
+    h, end = part_of(homes, index_of(share, wp.tid()), lanes)
+    while h < end:
         start = h * PATCH
         for k in range(PATCH):
             homes.patch[start + k] = wp.vec4(0.0, 0.0, 0.0, 0.0)
@@ -147,7 +147,7 @@ def scatter(
                         for r in range(3):
                             k = at + (o * SIDE + q) * SIDE + r
                             homes.fill[k] = homes.fill[k] + wx[o] * wy[q] * wz[r] * volume[p] * phase.density
-        h = drawn(homes.turn, SCATTERED)
+        h += 1
 
 
 def add_up(
@@ -164,9 +164,6 @@ def add_up(
 ):
     """Momentum and mass of every node, emptied before: the sum over all patches that hold it."""
     slot = index_of(share, wp.tid())
-    if slot == 0:
-        homes.turn[SCATTERED] = 0
-        homes.turn[GATHERED] = 0
     while slot < wp.min(active[0], block_of.shape[0]):
         world = block_of[slot] / grid.blocks_per_world
         block = coordinates(grid, block_of[slot] - world * grid.blocks_per_world)
@@ -192,6 +189,7 @@ def add_up(
 @wp.kernel
 def gather(
     share: wp.vec3i,
+    lanes: int,
     grid: Grid,
     capacity: int,
     homes: Homes,
@@ -212,8 +210,8 @@ def gather(
     fault: wp.array(dtype=int),
 ):
     """Velocity and affine velocity field of each particle from the patch of its home, then its motion."""
-    h = drawn(homes.turn, GATHERED)
-    while h < homes.total[0]:
+    h, end = part_of(homes, index_of(share, wp.tid()), lanes)
+    while h < end:
         start = h * PATCH
         own = block_of[homes.slot[h]]
         world = own / grid.blocks_per_world
@@ -260,7 +258,7 @@ def gather(
                 activate_stencil(grid, world, after, table, block_of, active, fault)
                 if home_of(grid, after) != home_of(grid, base):
                     homes.outdated[0] = 1
-        h = drawn(homes.turn, GATHERED)
+        h += 1
 
 
 @functools.cache

@@ -11,6 +11,7 @@ from fluidbench.method.suitability import check_backend
 from fluidbench.method.target import Target
 from fluidbench.native.crew import Crew, index_of, put, raise_fault
 from fluidbench.native.simulation import Simulation
+from fluidbench.study.speed import block
 
 from ..conftest import bead, scenario
 from .ballistic import Ballistic
@@ -125,6 +126,55 @@ def test_transfers_by_block_are_those_by_particle(case, ratio):
     for name, array in by_block.pool.fields.items():
         a, b = array.numpy(), by_particle.pool.fields[name].numpy()
         assert np.abs(a - b).max() <= 1e-4 * max(np.abs(b).max(), 1e-9), name
+
+
+@pytest.mark.parametrize("side", [13, 17, 26])
+def test_a_box_that_matter_fills_has_room_for_all_homes(side):
+    sim = Simulation(block("paste", side), "mpm")
+    sim.prepare()
+    vital = sim.begin()
+    homes = sim.solver.by_block.homes
+    assert vital.shortage is None and homes.number.numpy()[: homes.total.numpy()[0]].sum() == side**3
+
+
+def test_a_parent_that_moves_with_a_single_child_finds_its_home():
+    """Children below the least height are lifted over the border of a block."""
+    foam = {"kind": "spawn", "ratio": 1.2, "delay": 0.05, "jitter": 0.04, "margin": 1.2}
+    walls = {f"{axis}_{end}": "slip" for axis in "xyz" for end in ("lower", "upper")}
+    body = {"kind": "box", "center": [0.1, 0.1, 0.02], "size": [0.06, 0.06, 0.04]}
+    domain = {"lower": [0, 0, 0], "upper": [0.2] * 3, "walls": walls}
+    material = {"density": 1000.0, "viscosity": 0.1, "expansion": foam}
+    sim = Simulation(scenario(domain=domain, bodies=[body], material=material, duration=0.1, spacing=0.01), "mpm")
+    sim.prepare()
+    sim.begin()
+    grid, solver, checked = sim.solver.grid, sim.solver, 0
+    run = sim._run
+
+    def checking(substeps):
+        nonlocal checked
+        if not solver.by_block.homes.outdated.numpy()[0]:  # otherwise they are found anew
+            count = sim.pool.counts[0]
+            x = (sim.pool.position.numpy()[:count] - np.array(grid.origin)) * np.array(grid.inv_dx)
+            block_of = np.floor(x - 0.5).astype(int) >> 2
+            number = (block_of[:, 0] * grid.blocks[1] + block_of[:, 1]) * grid.blocks[2] + block_of[:, 2]
+            assert (solver.table.numpy()[number] - 1 == solver.by_block.homes.of_particle.numpy()[:count]).all()
+            checked += 1
+        run(substeps)
+
+    sim._run = checking
+    for _ in range(sim.ticks):
+        sim.advance_tick()
+    assert checked > 3 and sum(sim.pool.counts) > 144
+
+
+def test_a_runaway_speed_is_no_plan():
+    """A method that has broken is not asked for steps as small as its speed would have them."""
+    sim = Simulation(world(), "mpm")
+    sim.prepare()
+    sim.begin()
+    before = sim.speed
+    sim.kick(np.full((sim.pool.size, 3), 1e6, np.float32))
+    assert sim.look().complaint is not None and sim.speed == before
 
 
 def test_a_method_that_launches_for_itself_has_one_thread():

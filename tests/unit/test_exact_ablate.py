@@ -228,7 +228,7 @@ def test_the_command_of_a_mix_replaces_what_was_given():
     mix.change.settings.clear()
     mix.change.settings.update({"spacing": 0.5, "material.cure": None})
     assert command("line_bead", ["spacing=0.1", "seed=3"], mix) == (
-        "fluidbench run line_bead --solver mpm --set seed=3 --set spacing=0.5 --set material.cure=none"
+        "fluidbench run line_bead --solver mpm --threads 1 --set seed=3 --set spacing=0.5 --set material.cure=none"
     )
 
 
@@ -270,7 +270,7 @@ def test_the_page_names_what_is_needed_and_the_leanest_mix(tmp_path):
         "no way",
         "mpm: needed: a; droppable: b.",
         "mpm: leanest within 5%: b: saves 26% of the time, moves height_m by 1.2%. Alone: "
-        "fluidbench run line_bead --solver mpm --set seed=3 --set b=1",
+        "fluidbench run line_bead --solver mpm --threads 1 --set seed=3 --set b=1",
     ]
     assert [t.label for t in made.plots[0].traces] == ["mpm"] and len(made.data) == 5
     assert list(made.plots[0].traces[0].x) == pytest.approx([10.0, 25.0, 0.0])

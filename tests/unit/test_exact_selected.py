@@ -32,7 +32,7 @@ def test_findings_name_the_best_and_what_twice_would_take():
         "Recommended: mpm at spacing 2 m (mean dt 0.0001 s): error 20.0% (discretisation 20.0%, bias 0.0%), 4 s, "
         "40 wall s per simulated s."
     )
-    assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2"
+    assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2 --threads 1"
     assert lines[3].startswith("Twice as accurate: mpm at spacing 1 m") and lines[4].startswith(
         "Twice as fast: mpm at spacing 4 m"
     )

@@ -57,7 +57,8 @@ def conceive(
     parent: wp.array(dtype=int),
     number: wp.array(dtype=int),
 ):
-    """How many children each particle has now, 0 for none; all but the first get a place at the end of the pool."""
+    """How many children each particle has now, 0 for none; all but the first get a place at the end of the pool. `born`
+    counts them by world, and after these the parents."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world]:
@@ -75,6 +76,8 @@ def conceive(
                     if uniform(chance, origin[i], generation[i], 1) < law.ratio - whole:
                         children += 1
         offspring_count[i] = children
+        if children > 0:
+            wp.atomic_add(born, born.shape[0] - 1, 1)
         if children > 1:
             place = wp.atomic_add(born, world, children - 1)
             for c in range(1, children):

@@ -81,7 +81,7 @@ class Growing:
                 self.offspring_count = wp.zeros(pool.size, dtype=int)
                 self.parent = wp.zeros(pool.size, dtype=int)
                 self.number = wp.zeros(pool.size, dtype=int)
-                self.born = wp.zeros(pool.worlds, dtype=int)
+                self.born = wp.zeros(pool.worlds + 1, dtype=int)
                 self.old = wp.zeros(pool.worlds, dtype=int)
 
     def _birth_law(self, model: Expansion, generations: int) -> BirthLaw:
@@ -149,9 +149,11 @@ class Growing:
             [self.offspring_count, self.born, self.parent, self.number],
             device=device,
         )
-        born = self.born.numpy()
-        if not born.any() and self.model.kind == "growth":
+        *each, parents = self.born.numpy().tolist()
+        if not parents:
             return
+        pool.stale = True  # a parent moves even with a single child
+        born = np.array(each)
         for world in range(pool.worlds):
             pool.need(world, int(born[world]))
         self.old.assign(np.array(pool.counts, np.int32))
