@@ -12,6 +12,7 @@ from fluidbench.native.scene import Phase
 
 from . import constitutive
 from .bind import warp_func
+from .flow import pressure
 
 wp.set_module_options({"enable_backward": False})
 
@@ -19,7 +20,6 @@ wp.set_module_options({"enable_backward": False})
 # ever make matter denser must leave that alone: they rectified the noise into 5 to 9 % of volume.
 DISORDER = wp.constant(0.1)
 
-pressure = warp_func(constitutive.pressure)
 relieved = warp_func(constitutive.relieved)
 
 

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..errors import UserError
 from ..scenario.model import Model
 from .features import Feature
 
@@ -138,12 +139,13 @@ class Session(ABC):
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, with or without `begin`: for experiments on
-        stability."""
-        raise NotImplementedError("it picks its own step")
+        stability. Raises UserError where it cannot be told."""
+        raise UserError("it picks its own step")
 
     def kick(self, velocity: np.ndarray) -> None:
-        """Set every slot's velocity, shape (capacity, 3) [m/s]: for experiments on stability."""
-        raise NotImplementedError("its particles are its own")
+        """Set every slot's velocity, shape (capacity, 3) [m/s]: for experiments on stability. Raises UserError where it
+        cannot be told."""
+        raise UserError("its particles are its own")
 
     def allow_tension(self) -> None:  # noqa: B027
         """Let liquids carry tension instead of cavitating: for experiments on stability."""
@@ -171,9 +173,7 @@ class Method(ABC):
     rank: ClassVar[int] = 100  # where it stands among others in tables
     backends: ClassVar[tuple[str, ...]] = ("warp",)  # languages of its kernels
     devices: ClassVar[tuple[str, ...]] = ("cpu", "cuda")
-    shares_threads: ClassVar[bool] = (
-        False  # whether its Warp kernels can share several threads of the CPU (native/crew)
-    )
+    shares_threads: ClassVar[bool] = False  # whether several threads of the CPU can share its Warp kernels
     bounded: ClassVar[bool] = True  # whether its bounds are of stability; otherwise they are of accuracy
     bare: ClassVar[dict[str, Any]] = {}  # settings that leave of it what its theory of stability knows
     axes: ClassVar[tuple[NumericalAxis, ...]] = ()  # settings of its own that `stability` varies

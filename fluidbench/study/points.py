@@ -130,7 +130,7 @@ def measure_point(task: Task) -> dict[str, Any]:
     whose session cannot be told its step refuses."""
     try:
         return _point(task)
-    except NotImplementedError as reason:
+    except UserError as reason:
         named = {key: task[key] for key in ("axis", "value", "method")}
         return named | {"verdict": REFUSED, "reason": str(reason)}
 

@@ -20,14 +20,13 @@ class ByBlock:
         self.scene, self.pool, self.launch, self.lanes = scene, pool, scene.crew.launch, scene.crew.threads
         self.scatter, self.add_up = transfers(scene.expands)
         homes = self.homes = Homes()
-        most = slots  # where matter fills the grid nearly every block is a home
         with wp.ScopedDevice(scene.device):
             homes.total, homes.outdated = wp.zeros(1, dtype=int), wp.ones(1, dtype=int)
-            homes.slot, homes.first, homes.number = (wp.zeros(most, dtype=int) for _ in range(3))
+            homes.slot, homes.first, homes.number = (wp.zeros(slots, dtype=int) for _ in range(3))
             homes.members, homes.of_particle = (wp.zeros(pool.size, dtype=int) for _ in range(2))
             homes.of_slot = wp.zeros(slots, dtype=int)
-            homes.patch = wp.empty(most * PATCH, dtype=wp.vec4)
-            homes.fill = wp.empty(most * PATCH if scene.expands else 1, dtype=float)
+            homes.patch = wp.empty(slots * PATCH, dtype=wp.vec4)
+            homes.fill = wp.empty(slots * PATCH if scene.expands else 1, dtype=float)
 
     def prepare(self) -> None:
         for kernel in (find_homes, gather, self.scatter, self.add_up):
@@ -70,7 +69,7 @@ class ByBlock:
             [grid, pool.capacity, pool.count, pool.position, table, self.homes],
             [pool.fault],
         )
-        self.launch(enrol, 1, [pool.size, self.homes, pool.fault])
+        self.launch(enrol, 1, [pool.size, self.homes])
 
     def g2p(
         self, grid: Grid, moving: wp.array, feedback: Any, table: wp.array, block_of: wp.array, active: wp.array

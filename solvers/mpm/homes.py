@@ -8,7 +8,7 @@ import warp as wp
 
 from fluidbench.native.crew import index_of, raise_fault
 
-from .grid import FAULT_BLOCKS, Grid, first_node, wrapped
+from .grid import Grid, first_node, wrapped
 from .particle import FAULT_STENCIL
 
 wp.set_module_options({"enable_backward": False})
@@ -81,7 +81,7 @@ def find_homes(
 
 
 @wp.kernel
-def enrol(size: int, homes: Homes, fault: wp.array(dtype=int)):
+def enrol(size: int, homes: Homes):
     """Number the homes in the order of their first particles, and list who lives there; one thread does it all."""
     for slot in range(homes.of_slot.shape[0]):
         homes.of_slot[slot] = NOWHERE
@@ -90,16 +90,13 @@ def enrol(size: int, homes: Homes, fault: wp.array(dtype=int)):
         slot = homes.of_particle[p]
         if slot >= 0:
             h = homes.of_slot[slot]
-            if h < 0 and total < homes.slot.shape[0]:
+            if h < 0:
                 h = total
                 total += 1
                 homes.of_slot[slot] = h
                 homes.slot[h] = slot
                 homes.number[h] = 0
-            if h >= 0:
-                homes.number[h] = homes.number[h] + 1
-            else:
-                raise_fault(fault, FAULT_BLOCKS)
+            homes.number[h] = homes.number[h] + 1
     before = int(0)
     for h in range(total):
         homes.first[h] = before
@@ -109,9 +106,8 @@ def enrol(size: int, homes: Homes, fault: wp.array(dtype=int)):
         slot = homes.of_particle[p]
         if slot >= 0:
             h = homes.of_slot[slot]
-            if h >= 0:
-                homes.members[homes.first[h] + homes.number[h]] = p
-                homes.number[h] = homes.number[h] + 1
+            homes.members[homes.first[h] + homes.number[h]] = p
+            homes.number[h] = homes.number[h] + 1
     homes.total[0] = total
     homes.outdated[0] = 0
 

@@ -28,7 +28,7 @@ from .grid import (
     slots_of,
     turns,
 )
-from .particle import FAULT_STENCIL, Feedback, columns_scaled, inertia, moved, spline, strained, taken
+from .particle import FAULT_STENCIL, Feedback, columns_scaled, inertia, moved, stressed, taken, weights
 from .together import scatter_together, stencil
 from .walls import flipped, folded, grip, in_reach, mirror, near_wall, plane_share, unbound, wall_kind, wall_velocity
 
@@ -74,13 +74,9 @@ def p2g(
         p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
     phase = phases[world, phase_of[p]]
     m = inertia(mass[p], held[p])
-    a = strained(grid, dt[world], phase, p, on, affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear)
+    a = stressed(grid, dt[world], phase, p, on, affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear)
     base = first_node(grid, position[p])
-    f = wp.cw_mul(position[p] - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
-    wx0, wx1, wx2 = spline(f[0])
-    wy0, wy1, wy2 = spline(f[1])
-    wz0, wz1, wz2 = spline(f[2])
-    wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+    f, wx, wy, wz = weights(grid, position[p], base)
     bx, by, bz, lx, ly, lz = node_parts(grid, base)
     s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
     if on and wp.min(wp.min(wp.min(s0, s1), wp.min(s2, s3)), wp.min(wp.min(s4, s5), wp.min(s6, s7))) < 0:
@@ -215,11 +211,7 @@ def g2p(
         base = first_node(grid, x)
         v = velocity[p]
         if held[p] != CARRIED:  # what is clamped strains, but keeps its velocity
-            f = wp.cw_mul(x - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
-            wx0, wx1, wx2 = spline(f[0])
-            wy0, wy1, wy2 = spline(f[1])
-            wz0, wz1, wz2 = spline(f[2])
-            wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+            f, wx, wy, wz = weights(grid, x, base)
             bx, by, bz, lx, ly, lz = node_parts(grid, base)
             s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
             v = wp.vec3(0.0, 0.0, 0.0)

@@ -7,15 +7,13 @@ from fluidbench.native.crew import raise_fault
 from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Phase, is_solid, too_fast
 
-from .. import constitutive
 from ..bind import warp_func
+from ..flow import pressure, strained
 from ..smoothing import quadratic_spline
 from .grid import Grid, first_node
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-pressure = warp_func(constitutive.pressure)
-strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
 # Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
@@ -66,13 +64,23 @@ def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocit
 
 
 @wp.func
+def weights(grid: Grid, x: wp.vec3, base: wp.vec3i):
+    """(where x lies beyond its lowest node, in cells; the weights of its three nodes along x, y and z)."""
+    f = wp.cw_mul(x - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
+    wx0, wx1, wx2 = spline(f[0])
+    wy0, wy1, wy2 = spline(f[1])
+    wz0, wz1, wz2 = spline(f[2])
+    return f, wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+
+
+@wp.func
 def inertia(mass: float, held: int):
     """With which a particle takes part in the momentum of its nodes [kg]."""
     return wp.where(held == CLAMPED, ANCHOR * mass, mass)
 
 
 @wp.func
-def strained(
+def stressed(
     grid: Grid,
     dt: float,
     phase: Phase,
@@ -99,31 +107,7 @@ def strained(
         j *= wp.max(1.0 + dt * wp.trace(c), 0.1)
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
-            b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                c[0, 0],
-                c[0, 1],
-                c[0, 2],
-                c[1, 0],
-                c[1, 1],
-                c[1, 2],
-                c[2, 0],
-                c[2, 1],
-                c[2, 2],
-                b[0],
-                b[1],
-                b[2],
-                s[0],
-                s[1],
-                s[2],
-                phase.shear_modulus,
-                phase.yield_stress,
-                phase.plastic_viscosity,
-                phase.flow_index,
-                phase.relaxation_rate,
-                dt,
-            )
-            b = wp.vec3(b_xx, b_yy, b_zz)
-            s = wp.vec3(b_xy, b_xz, b_yz)
+            b, s = strained(phase, phase.shear_modulus, c, b, s, dt)
             elastic_normal[p] = b
             elastic_shear[p] = s
         a -= columns_scaled(kirchhoff(phase, j, b, s, c), (4.0 * dt * volume[p]) * wp.cw_mul(grid.inv_dx, grid.inv_dx))

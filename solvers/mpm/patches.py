@@ -16,7 +16,7 @@ from fluidbench.native.scene import Phase
 from ..bind import rebound
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
-from .particle import Feedback, affine_of, inertia, moved, spline, strained, taken
+from .particle import Feedback, affine_of, inertia, moved, stressed, taken, weights
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -127,17 +127,11 @@ def scatter(
             world = p / capacity
             phase = phases[world, phase_of[p]]
             m = inertia(mass[p], held[p])
-            a = strained(
+            a = stressed(
                 grid, dt[world], phase, p, True, affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear
             )
             base = first_node(grid, position[p])
-            f = wp.cw_mul(position[p] - grid.origin, grid.inv_dx) - wp.vec3(
-                float(base[0]), float(base[1]), float(base[2])
-            )
-            wx0, wx1, wx2 = spline(f[0])
-            wy0, wy1, wy2 = spline(f[1])
-            wz0, wz1, wz2 = spline(f[2])
-            wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+            f, wx, wy, wz = weights(grid, position[p], base)
             momentum = m * velocity[p] - a * f
             at = start + place_in_patch(grid, base)
             add_to_nodes(homes.patch, at, wx, wy, wz, momentum, m, a)
@@ -235,11 +229,7 @@ def gather(
             v = velocity[p]
             if held[p] != CARRIED:  # what is clamped strains, but keeps its velocity
                 at = start + place_in_patch(grid, base)
-                f = wp.cw_mul(x - grid.origin, grid.inv_dx) - wp.vec3(float(base[0]), float(base[1]), float(base[2]))
-                wx0, wx1, wx2 = spline(f[0])
-                wy0, wy1, wy2 = spline(f[1])
-                wz0, wz1, wz2 = spline(f[2])
-                wx, wy, wz = wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
+                f, wx, wy, wz = weights(grid, x, base)
                 sums = taken_from_nodes(homes.patch, at, wx, wy, wz, f)
                 affine[p] = affine_of(grid, sums)
                 v = taken(

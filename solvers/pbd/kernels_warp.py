@@ -17,10 +17,10 @@ from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Box, Force, Phase, force_at, too_fast
 from fluidbench.native.vector_access import store_vec4
 
-from .. import constitutive
 from ..aging import rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
+from ..flow import strained
 from ..images import WALL_INSET, contained, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import poly6, spiky, spiky_slope
@@ -33,7 +33,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 kernel = warp_func(poly6)
 summed = warp_func(spiky)
 gradient = warp_func(spiky_slope)
-strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 smoothing_weight = warp_func(laws.smoothing_weight, laws.largest_viscosity)
 conveyed_modulus = warp_func(laws.conveyed_modulus, laws.largest_modulus)
 
@@ -309,20 +308,7 @@ def strain_finish(num: Numbers, box: Box, data: Shearing, world: int, i: int, ow
         b = data.elastic_normal[i]
         s = data.elastic_shear[i]
         if data.held[i] != CARRIED:
-            b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                slope[0, 0], slope[0, 1], slope[0, 2],
-                slope[1, 0], slope[1, 1], slope[1, 2],
-                slope[2, 0], slope[2, 1], slope[2, 2],
-                b[0], b[1], b[2], s[0], s[1], s[2],
-                modulus,
-                phase.yield_stress,
-                phase.plastic_viscosity,
-                phase.flow_index,
-                phase.relaxation_rate,
-                h,
-            )  # fmt: skip
-            b = wp.vec3(b_xx, b_yy, b_zz)
-            s = wp.vec3(b_xy, b_xz, b_yz)
+            b, s = strained(phase, modulus, slope, b, s, h)
             data.elastic_normal[i] = b
             data.elastic_shear[i] = s
         stress = elastic_stress(modulus, b, s, 0.0) * correction

@@ -26,6 +26,7 @@ from ..search import FAULT_NEIGHBOURS
 from ..smoothing import spiky
 from . import bonds, laws
 from . import kernels_warp as kernels
+from .network import Network
 
 
 class ConfigPBD(Config):
@@ -163,7 +164,7 @@ class SolverPBD(Solver):
         if scene.flowing:
             pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
             pool.add_field("elastic_shear", wp.vec3)
-        self.network = bonds.Network(scene, pool, self.backend, self.kernels) if bonds.needed(scene) else None
+        self.network = Network(scene, pool, self.backend, self.kernels) if bonds.needed(scene) else None
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)

@@ -16,18 +16,16 @@ from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
 from fluidbench.native.vector_access import store_vec4
 
-from .. import constitutive
 from ..aging import DISORDER, rest_density
 from ..bind import warp_func
 from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
+from ..flow import pressure, strained
 from ..images import WALL_INSET, contained, image_gradient, image_rate, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-pressure = warp_func(constitutive.pressure)
-strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 kernel = warp_func(wendland)
 slope = warp_func(wendland_slope)
 
@@ -232,20 +230,7 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
             b = data.elastic_normal[i]
             s = data.elastic_shear[i]
             if data.held[i] != CARRIED:
-                b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = strain_and_flow(
-                    gradient[0, 0], gradient[0, 1], gradient[0, 2],
-                    gradient[1, 0], gradient[1, 1], gradient[1, 2],
-                    gradient[2, 0], gradient[2, 1], gradient[2, 2],
-                    b[0], b[1], b[2], s[0], s[1], s[2],
-                    phase.shear_modulus,
-                    phase.yield_stress,
-                    phase.plastic_viscosity,
-                    phase.flow_index,
-                    phase.relaxation_rate,
-                    h,
-                )  # fmt: skip
-                b = wp.vec3(b_xx, b_yy, b_zz)
-                s = wp.vec3(b_xy, b_xz, b_yz)
+                b, s = strained(phase, phase.shear_modulus, gradient, b, s, h)
                 data.elastic_normal[i] = b
                 data.elastic_shear[i] = s
             g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J

@@ -1,11 +1,13 @@
-"""The same answers on CUDA as on the CPU, within the measure's resolution. Run with -m gpu."""
+"""The same answers on CUDA as on the CPU, within the measure's resolution, and late news of it. Run with -m gpu."""
 
+import numpy as np
 import pytest
 
 from fluidbench.measure.ledger import ledger, lengths
 from fluidbench.method.target import Target
 from fluidbench.method.verdict import Verdict
-from fluidbench.native.simulation import Simulation
+from fluidbench.native.simulation import LOOK_TICKS, Simulation
+from fluidbench.runs.drive import Drive
 
 from ..conftest import NATIVE, bead, drive
 
@@ -23,3 +25,38 @@ def test_cuda_agrees_with_the_cpu(name):
     assert rows[0]["mass_kg"] == rows[1]["mass_kg"]
     for key in ("top_m", "center_x_m", "center_z_m"):
         assert rows[0][key] == pytest.approx(rows[1][key], abs=s.spacing / 2)
+
+
+@pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)])
+@pytest.mark.parametrize("name", NATIVE)
+def test_a_run_that_breaks_is_stopped_and_dated(name, device):
+    """At the first look after it, on a GPU at most two spans of ticks later; its costs are of all that was paid for."""
+    s = bead(duration=0.4)
+    sim = Simulation(s, name, Target(device))
+    sim.prepare()
+    way = Drive(sim, s)
+    way.begin()
+    while sim.now < 0.15:
+        way.leg()
+    hit, velocity = sim.now, sim.pool.velocity.numpy()
+    velocity[3] = np.nan
+    sim.pool.velocity.assign(velocity)
+    while sim.now < way.end - way.near and way.outcome.verdict is Verdict.COMPLETED:
+        way.leg()
+    assert way.outcome.verdict is Verdict.DIVERGED
+    spans = 1 if device == "cpu" else LOOK_TICKS
+    assert hit <= way.outcome.time <= hit + (spans + 0.5) * sim.tick
+    assert way.outcome.time <= sim.now <= way.outcome.time + (2 * spans + 0.5) * sim.tick
+
+
+@pytest.mark.gpu
+def test_what_a_gpu_is_asked_at_a_time_changes_nothing():
+    """Ticks one by one, or as many as an output holds: plans go by ticks alone. SPH adds in one order."""
+    s = bead(duration=0.4)
+    one, many = (Simulation(s, "sph", Target("cuda:0")) for _ in range(2))
+    assert drive(many).verdict is Verdict.COMPLETED
+    one.prepare()
+    one.begin()
+    for _ in range(one.ticks):
+        one.advance_tick()
+    assert (one.frame()["position"] == many.frame()["position"]).all()

@@ -4,11 +4,10 @@ A parent becomes the first of its children, the others take free slots and inher
 split evenly and momentum stays. What a child is depends on its parent's identity and on the scenario's seed alone.
 """
 
-from typing import Any
-
 import warp as wp
 
 from ...method.frame import CARRIED
+from ..pool import Memory
 from ..scene import PERIODIC, Box
 from .chance import Chance, direction, uniform
 
@@ -92,15 +91,19 @@ def inherit(
     old: wp.array(dtype=int),
     born: wp.array(dtype=int),
     capacity: int,
+    size: int,
     parent: wp.array(dtype=int),
-    # outputs
-    field: wp.array(dtype=Any),  # type: ignore[valid-type]
+    memory: Memory,
 ):
-    """Copy a field from parents to their new children."""
+    """Copy every field from parents to their new children."""
     world, i = wp.tid()
     if i < born[world]:
         slot = world * capacity + old[world] + i
-        field[slot] = field[parent[slot]]
+        for field in range(memory.width.shape[0]):
+            width = memory.width[field]
+            words = wp.array(ptr=memory.address[field], shape=(size * width,), dtype=wp.int32)
+            for k in range(width):
+                words[slot * width + k] = words[parent[slot] * width + k]
 
 
 @wp.func

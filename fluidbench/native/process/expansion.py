@@ -158,14 +158,12 @@ class Growing:
             pool.need(world, int(born[world]))
         self.old.assign(np.array(pool.counts, np.int32))
         if born.any():
-            for field in pool.fields.values():
-                wp.launch(
-                    inherit,
-                    (pool.worlds, int(born.max())),
-                    [self.old, self.born, pool.capacity, self.parent],
-                    [field],
-                    device=device,
-                )
+            wp.launch(
+                inherit,
+                (pool.worlds, int(born.max())),
+                [self.old, self.born, pool.capacity, pool.size, self.parent, pool.memory],
+                device=device,
+            )
             for world in range(pool.worlds):
                 pool.set_count(world, pool.counts[world] + int(born[world]))
         wp.launch(

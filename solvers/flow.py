@@ -1,0 +1,31 @@
+"""The material law on Warp's vectors and matrices."""
+
+import warp as wp
+
+from fluidbench.native.scene import Phase
+
+from . import constitutive
+from .bind import warp_func
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+pressure = warp_func(constitutive.pressure)
+strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
+
+
+@wp.func
+def strained(phase: Phase, modulus: float, l: wp.mat33, b: wp.vec3, s: wp.vec3, h: float):
+    """The elastic tensor after a step h [s] under the velocity gradient l: its diagonal b, and s: xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = strain_and_flow(
+        l[0, 0], l[0, 1], l[0, 2],
+        l[1, 0], l[1, 1], l[1, 2],
+        l[2, 0], l[2, 1], l[2, 2],
+        b[0], b[1], b[2], s[0], s[1], s[2],
+        modulus,
+        phase.yield_stress,
+        phase.plastic_viscosity,
+        phase.flow_index,
+        phase.relaxation_rate,
+        h,
+    )  # fmt: skip
+    return wp.vec3(xx, yy, zz), wp.vec3(xy, xz, yz)
