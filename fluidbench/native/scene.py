@@ -63,6 +63,14 @@ class Force:
     gradient: wp.mat33
 
 
+@wp.struct
+class Outlet:
+    """How what is carried moves until it is let go: downwards, in discs."""
+
+    speed: float  # against the outlet [m/s]
+    spacing: float  # from disc to disc [m]
+
+
 @wp.func
 def force_at(force: Force, x: wp.vec3):
     """Force per unit mass [m/s^2] at a point."""
@@ -108,6 +116,9 @@ class Scene:
         self.top_speed = top_speed(self.scenario, self.top_wave_speed)
         self.box = box_of(self.scenario)
         self.box.top_speed = self.top_speed
+        self.outlet = Outlet()
+        self.outlet.speed = 1.0 if self.scenario.nozzle is None else self.scenario.nozzle.speed
+        self.outlet.spacing = self.spacing
         self._dt = math.nan
         with wp.ScopedDevice(self.device):
             self.dt = wp.zeros(self.worlds, dtype=float)
@@ -145,8 +156,9 @@ class Scene:
         phase.relaxation_rate = 0.0 if material.relaxation_time is None else 1.0 / material.relaxation_time
         phase.flow_index = material.flow_index
         phase.tait = 1.0 if material.equation_of_state == "tait" else 0.0
-        # A liquid cavitates rather than carry tension; what has shear stiffness holds together.
-        phase.tension_limit = 0.0 if material.youngs_modulus is None else NEVER_YIELDS
+        # Unless told, a liquid cavitates rather than carry tension; what has shear stiffness holds together.
+        limit = 0.0 if material.youngs_modulus is None else NEVER_YIELDS
+        phase.tension_limit = limit if material.tension_limit is None else min(material.tension_limit, NEVER_YIELDS)
         return phase
 
     def _any(self, holds: Callable[[Material], bool]) -> bool:

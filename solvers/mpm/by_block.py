@@ -1,7 +1,5 @@
 """The transfers of MPM on the CPU, block by block: what they allocate, and their launches."""
 
-from typing import Any
-
 import warp as wp
 
 from fluidbench.native.crew import put
@@ -10,7 +8,7 @@ from fluidbench.native.scene import Scene
 
 from .grid import Grid
 from .homes import PATCH, Homes, enrol, find_homes
-from .patches import gather, transfers
+from .patches import add_up, gather, scatter
 
 
 class ByBlock:
@@ -18,7 +16,6 @@ class ByBlock:
 
     def __init__(self, scene: Scene, pool: Pool, slots: int) -> None:
         self.scene, self.pool, self.launch, self.lanes = scene, pool, scene.crew.launch, scene.crew.threads
-        self.scatter, self.add_up = transfers(scene.expands)
         homes = self.homes = Homes()
         with wp.ScopedDevice(scene.device):
             homes.total, homes.outdated = wp.zeros(1, dtype=int), wp.ones(1, dtype=int)
@@ -26,21 +23,20 @@ class ByBlock:
             homes.members, homes.of_particle = (wp.zeros(pool.size, dtype=int) for _ in range(2))
             homes.of_slot = wp.zeros(slots, dtype=int)
             homes.patch = wp.empty(slots * PATCH, dtype=wp.vec4)
-            homes.fill = wp.empty(slots * PATCH if scene.expands else 1, dtype=float)
 
     def prepare(self) -> None:
-        for kernel in (find_homes, gather, self.scatter, self.add_up):
+        for kernel in (find_homes, scatter):
             self.scene.crew.load(kernel.module)
 
     def refresh(self) -> None:
         self.launch(put, 1, [1, self.homes.outdated])
 
-    def p2g(self, grid: Grid, table: wp.array, block_of: wp.array, active: wp.array, sums: list[wp.array]) -> None:
-        """Find homes anew where particles have moved to others; then scatter, and add up to `sums` (raw, fill)."""
+    def p2g(self, grid: Grid, table: wp.array, block_of: wp.array, active: wp.array, raw: wp.array) -> None:
+        """Find homes anew where particles have moved to others; then scatter, and add up."""
         pool, scene = self.pool, self.scene
         wp.capture_if(self.homes.outdated, on_true=lambda: self._enrol(grid, table))
         self.launch(
-            self.scatter,
+            scatter,
             self.lanes,
             [
                 self.lanes,
@@ -59,7 +55,7 @@ class ByBlock:
             ],
             [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear],
         )
-        self.launch(self.add_up, self.lanes, [self.lanes, grid, active, block_of, table, self.homes], sums)
+        self.launch(add_up, self.lanes, [self.lanes, grid, active, block_of, table, self.homes], [raw])
 
     def _enrol(self, grid: Grid, table: wp.array) -> None:
         pool = self.pool
@@ -72,9 +68,15 @@ class ByBlock:
         self.launch(enrol, 1, [pool.size, self.homes])
 
     def g2p(
-        self, grid: Grid, moving: wp.array, feedback: Any, table: wp.array, block_of: wp.array, active: wp.array
+        self,
+        grid: Grid,
+        moving: wp.array,
+        shifting: float,
+        table: wp.array,
+        block_of: wp.array,
+        active: wp.array,
     ) -> None:
-        pool, scene = self.pool, self.scene
+        pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
         self.launch(
             gather,
             self.lanes,
@@ -88,7 +90,10 @@ class ByBlock:
                 scene.phases,
                 pool.phase,
                 pool.held,
-                feedback,
+                shifting,
+                scene.outlet,
+                hours.row,
+                hours.exit,
             ],
             [
                 pool.position,

@@ -7,7 +7,7 @@ from fluidbench.native.scene import FRICTION, PERIODIC, STICK
 
 from ..taichi_bridge import Ints, Quads, Vectors, ivec3, struct_of, ti, vec3, vec4
 from .grid import FAULT_BLOCKS, FIRST, Grid
-from .walls import CONTACT_BEGINS, CONTACT_ENDS
+from .walls import CONTACT_BEGINS, CONTACT_ENDS, THIN, TINY
 
 GridT = struct_of(Grid)
 
@@ -127,21 +127,28 @@ def in_reach(grid, node):
 
 
 @ti.func
-def contact(grid, world, node, axis: ti.template(), rest, table: ti.template(), fill: ti.template()):
+def beyond_wall(grid, node, axis: ti.template(), cells):
+    """The node of the same column that is so many cells inside the wall nearest to it; behind it where negative."""
+    out = node
+    out[axis] = FIRST + cells
+    if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
+        out[axis] = FIRST + grid.cells[axis] - cells
+    return out
+
+
+@ti.func
+def contact(grid, world, node, axis: ti.template(), table: ti.template(), raw: ti.template()):
     """Share, 0 to 1, with which the wall nearest to a node acts: all of it for mirrors, none for periodic axes, and by
-    how full the wall's own node is for rough and no-slip walls."""
+    how near matter is for rough and no-slip walls: the masses of the column's first two nodes tell."""
     kind = kind_near(grid, node, axis)
     share = 1.0
     if kind == PERIODIC:
         share = 0.0
     elif kind == FRICTION or kind == STICK:
-        on_wall = node
-        on_wall[axis] = FIRST
-        if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
-            on_wall[axis] = FIRST + grid.cells[axis]
-        # half of the cell of a node on a wall lies inside
-        filled = 2.0 * content(grid, world, on_wall, table, fill)[3] * grid.inv_volume / rest
-        share = ti.math.clamp((filled - CONTACT_BEGINS) / (CONTACT_ENDS - CONTACT_BEGINS), 0.0, 1.0)
+        first = content(grid, world, beyond_wall(grid, node, axis, 0), table, raw)[3]
+        second = content(grid, world, beyond_wall(grid, node, axis, 1), table, raw)[3]
+        span = ti.max((CONTACT_ENDS - CONTACT_BEGINS) * second, TINY)
+        share = ti.math.clamp((first - CONTACT_BEGINS * second) / span, 0.0, 1.0)
     return share
 
 
@@ -221,6 +228,53 @@ def bounded(grid, node, touching, velocity):
                 v[axis] = 0.0
                 v *= 1.0 - ti.min(friction * into / ti.max(v.norm(), 1.0e-12), 1.0)
     return v
+
+
+@ti.func
+def on_wall(grid, node, axis: ti.template()):
+    return node[axis] == FIRST or node[axis] == FIRST + grid.cells[axis]
+
+
+@ti.func
+def squeezed(grid, world, node, inside, touching, kick, result, table: ti.template(), raw: ti.template()):
+    """A node's velocities, those across no-slip walls as of matter that goes as z^2: -U/3 on the wall, U beside it."""
+    out = result
+    for axis in ti.static(range(3)):
+        free, sign = True, 1.0
+        others = touching
+        others[axis] = 0
+        for other in ti.static(range(3)):
+            if others[other] == 1 and kind_near(grid, node, other) == STICK:
+                if on_wall(grid, inside, other):
+                    free = False
+                if inside[other] != node[other]:
+                    sign = -sign
+        if touching[axis] == 1 and kind_near(grid, node, axis) == STICK and free:
+            middle = folded(grid, world, beyond_wall(grid, inside, axis, 0), others, table, raw)
+            sides = folded(grid, world, beyond_wall(grid, inside, axis, 1), others, table, raw)
+            sides += folded(grid, world, beyond_wall(grid, inside, axis, -1), others, table, raw)
+            u = 0.0
+            if sides[3] > 0.0:
+                mass = ti.max(sides[3] - middle[3] / 3.0, THIN * sides[3])
+                u = sign * ((sides[axis] - middle[axis] / 3.0) / mass + kick[axis])
+            out[axis] = u
+            if on_wall(grid, node, axis):
+                out[axis] = -u / 3.0
+    return out
+
+
+@ti.func
+def near_walls(grid, x, c):
+    """The affine field that carries momentum; du/dz near a no-slip wall times (1 + 2 (z / 1.5)^2) / 3, z in cells."""
+    out = c
+    for axis in ti.static(range(3)):
+        gap = 1.5
+        if grid.lower_kind[axis] == STICK:
+            gap = ti.min(gap, (x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
+        if grid.upper_kind[axis] == STICK:
+            gap = ti.min(gap, (grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
+        out[axis, axis] *= (1.0 + 2.0 * (gap / 1.5) ** 2) / 3.0
+    return out
 
 
 @ti.func

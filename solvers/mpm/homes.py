@@ -31,7 +31,6 @@ class Homes:
     of_particle: wp.array(dtype=int)  # the slot of its home; NOWHERE for none
     outdated: wp.array(dtype=int)
     patch: wp.array(dtype=wp.vec4)
-    fill: wp.array(dtype=float)
 
 
 @wp.func

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY
+from fluidbench.native.scene import Outlet
 
 from ..flow_taichi import pressure, strained
 from ..smoothing import quadratic_spline
@@ -45,17 +46,19 @@ from .grid_taichi import (
     kind_near,
     near,
     near_any,
+    near_walls,
     node_at,
     reset_blocks,
     seen_in_wall,
     share_inside,
     slots_in_use,
+    squeezed,
     wrapped,
 )
-from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, Feedback
+from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
 
 spline = taichi_func(quadratic_spline)
-FeedbackT = struct_of(Feedback)
+OutletT = struct_of(Outlet)
 
 
 @ti.func
@@ -90,7 +93,10 @@ def g2p(
     phases: Phases,
     phase_of: Ints,
     held: Ints,
-    feedback: FeedbackT,
+    shifting: float,
+    outlet: OutletT,
+    row: Ints,
+    exit: Vectors,
     position: Vectors,
     velocity: Vectors,
     affine: Matrices,
@@ -106,30 +112,37 @@ def g2p(
         if p - world * capacity < count[world]:
             x, v, h = position[p], velocity[p], dt[world]
             base = base_node(grid, x)
-            if held[p] != CARRIED:
-                f = (x - grid.origin) * grid.inv_dx - base
-                w = weights(f)
-                gathered, density = vec3(0.0), 0.0
-                moment = mat3(0.0)  # sum of w v (x_node - x) in cells
-                for o, q in ti.ndrange(3, 3):
-                    share = w[0, o] * w[1, q]
-                    for r in ti.static(range(3)):
-                        at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
-                        node = share * w[2, r] * moving[ti.max(at, 0)]
-                        u = vec3(node[0], node[1], node[2])
-                        gathered += u
-                        density += node[3]
-                        moment += u.outer_product(vec3(o, q, r) - f)
-                for a, b in ti.static(ti.ndrange(3, 3)):
-                    moment[a, b] *= 4.0 * grid.inv_dx[b]
-                affine[p] = moment
-                if held[p] == FREE:
-                    v = gathered
-                    velocity[p] = v
-                phase = phase_at(phases, world, phase_of[p])
-                crowding = volume_ratio[p] * density / phase.density - 1.0 - feedback.tolerance
-                if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
-                    volume_ratio[p] *= 1.0 - ti.min(h * feedback.rate * phase.wave_speed * crowding, 0.1)
+            f = (x - grid.origin) * grid.inv_dx - base
+            w = weights(f)
+            gathered, density = vec3(0.0), 0.0
+            moment, lean = mat3(0.0), vec3(0.0)  # sums of w v (x_node - x) and of w rho (x_node - x) in cells
+            for o, q in ti.ndrange(3, 3):
+                share = w[0, o] * w[1, q]
+                for r in ti.static(range(3)):
+                    at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
+                    node = share * w[2, r] * moving[ti.max(at, 0)]
+                    u = vec3(node[0], node[1], node[2])
+                    gathered += u
+                    density += node[3]
+                    moment += u.outer_product(vec3(o, q, r) - f)
+                    lean += node[3] * (vec3(o, q, r) - f)
+            for a, b in ti.static(ti.ndrange(3, 3)):
+                moment[a, b] *= 4.0 * grid.inv_dx[b]
+            affine[p] = moment
+            phase = phase_at(phases, world, phase_of[p])
+            if held[p] == FREE:
+                v = gathered
+                velocity[p] = v
+                crowding = density * volume_ratio[p] / phase.density
+                if not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
+                    strain = 0.5 * (moment + moment.transpose())
+                    strain -= (strain.trace() / 3.0) * ti.Matrix.identity(ti.f32, 3)
+                    amount = ti.min(shifting * h * ti.sqrt(2.0 * strain.norm_sqr()), STEEPEST)
+                    x -= (4.0 * amount / phase.density) * lean * grid.dx
+            elif held[p] == CARRIED:
+                ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] - x[2]) - v[2]
+                left = ti.math.clamp(1.0 - ahead / outlet.speed, 1.0 / PACKED, PACKED)
+                volume_ratio[p] += ti.min(outlet.speed * h / outlet.spacing, 1.0) * (left - volume_ratio[p])
             free = x + h * v
             if too_fast(v, grid.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
@@ -146,9 +159,8 @@ def g2p(
 
 
 @functools.cache
-def passes(expands: bool, alone: bool) -> SimpleNamespace:
-    """All passes, those that differ where matter expands compiled for this case; a thread that is alone needs no atomic
-    additions, which would take half of its time."""
+def passes(alone: bool) -> SimpleNamespace:
+    """All passes; a thread that is alone needs no atomic additions, which would take half of its time."""
 
     @ti.func
     def add(target: ti.template(), at, value):
@@ -176,7 +188,6 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
         elastic_normal: Vectors,
         elastic_shear: Vectors,
         raw: Quads,
-        fill: Quads,
         fault: Ints,
     ):
         for p in range(position.shape[0]):
@@ -189,7 +200,7 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
                     inertia *= ANCHOR
                 a = mat3(0.0)  # momentum per distance from the particle
                 if held[p] == FREE:
-                    a = inertia * c
+                    a = inertia * near_walls(grid, position[p], c)
                 if held[p] != CARRIED:
                     j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
                     b, s = elastic_normal[p], elastic_shear[p]
@@ -213,8 +224,6 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
                             share = w[0, o] * w[1, q] * w[2, r]
                             momentum = share * (own + a @ ((vec3(o, q, r) - f) * grid.dx))
                             add(raw, at, vec4(momentum[0], momentum[1], momentum[2], share * inertia))
-                            if ti.static(expands):
-                                add(fill, at, vec4(0.0, 0.0, 0.0, share * volume[p] * phase.density))
 
     @ti.kernel
     def grid_step(
@@ -224,10 +233,8 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
         block_of: Ints,
         table: Ints,
         raw: Quads,
-        fill: Quads,
         dt: Floats,
         force: Forces,
-        phases: Phases,
         moving: Quads,
     ):
         for t in range(ti.min(active[0] * 64, raw.shape[0])):
@@ -238,23 +245,19 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
             result = vec4(0.0)
             if (wall or raw[t][3] > 0.0) and in_reach(grid, node):
                 inside, touching, hold = node, ivec3(0), 1.0
-                total, fullness = raw[t], fill[t][3]
+                total = raw[t]
                 if wall:
                     for axis in ti.static(range(3)):
-                        share = contact(grid, world, node, axis, phases[world, 0, 0], table, fill)
+                        share = contact(grid, world, node, axis, table, raw)
                         if near(grid, node, axis) and share > 0.0:
                             hold = ti.min(hold, share)
                             touching[axis] = 1
                             inside[axis] = in_front(grid, node, axis)
                     total = folded(grid, world, inside, touching, table, raw)
-                    if ti.static(expands):
-                        fullness = folded(grid, world, inside, touching, table, fill)[3]
                 if total[3] > 0.0:
                     kick = dt[world] * force_at(force, world, grid.origin + grid.dx * inside)
                     v = vec3(total[0], total[1], total[2]) / total[3] + kick
                     density = total[3] * grid.inv_volume
-                    if ti.static(expands):
-                        density = fullness * grid.inv_volume
                     if wall:
                         v = bounded(grid, inside, touching, v)
                         density *= share_inside(grid, inside)
@@ -262,6 +265,8 @@ def passes(expands: bool, alone: bool) -> SimpleNamespace:
                     for axis in ti.static(range(3)):
                         if inside[axis] != node[axis]:
                             result = seen_in_wall(result, axis, kind_near(grid, node, axis))
+                    if wall:
+                        result = squeezed(grid, world, node, inside, touching, kick, result, table, raw)
                     if hold < 1.0:  # between a wall that acts in full and none
                         own = raw[t]
                         free = vec4(0.0, 0.0, 0.0, result[3])

@@ -4,17 +4,14 @@ One substep: clear_grid, p2g (strain, stress, scatter), grid (momentum balance a
 Quadratic B-splines; D = diag(dx^2) / 4, so the inverse inertia tensor is 4 diag(1 / dx^2).
 """
 
-import functools
 from types import SimpleNamespace
 
 import warp as wp
 
-from fluidbench.method.frame import CARRIED
 from fluidbench.native.crew import BLOCK, index_of, raise_fault
-from fluidbench.native.scene import Force, Phase, force_at
+from fluidbench.native.scene import Force, Outlet, Phase, force_at
 from fluidbench.native.vector_access import in_company, load_vec4
 
-from ..bind import rebound
 from .grid import (
     FIRST,
     Grid,
@@ -28,16 +25,28 @@ from .grid import (
     slots_of,
     turns,
 )
-from .particle import FAULT_STENCIL, Feedback, columns_scaled, inertia, moved, stressed, taken, weights
+from .particle import FAULT_STENCIL, affine_of, inertia, moved, shifted, stressed, taken, weights
 from .together import scatter_together, stencil
-from .walls import flipped, folded, grip, in_reach, mirror, near_wall, plane_share, unbound, wall_kind, wall_velocity
+from .walls import (
+    beside,
+    flipped,
+    folded,
+    grip,
+    in_reach,
+    mirror,
+    near_wall,
+    plane_share,
+    unbound,
+    wall_kind,
+    wall_velocity,
+)
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 GATHERING = 4  # blocks of a gather that shall share a multiprocessor of a GPU: what registers it may use
-EXPANDS = False  # whether rest densities may differ, see `passes`
 
 
+@wp.kernel
 def p2g(
     grid: Grid,
     capacity: int,
@@ -57,14 +66,9 @@ def p2g(
     elastic_normal: wp.array(dtype=wp.vec3),
     elastic_shear: wp.array(dtype=wp.vec3),
     raw: wp.array(dtype=wp.vec4),
-    fill: wp.array(dtype=wp.vec4),
     fault: wp.array(dtype=int),
 ):
-    """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18).
-
-    Where rest densities differ (EXPANDS) mass does not tell how full a node is: `fill` collects fresh density times
-    rest volume instead.
-    """
+    """Strain and stress of each particle, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18)."""
     p = wp.tid()
     world = p / capacity
     on = p - world * capacity < count[world]
@@ -74,7 +78,9 @@ def p2g(
         p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
     phase = phases[world, phase_of[p]]
     m = inertia(mass[p], held[p])
-    a = stressed(grid, dt[world], phase, p, on, affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear)
+    a = stressed(
+        grid, dt[world], phase, p, on, position[p], affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear
+    )
     base = first_node(grid, position[p])
     f, wx, wy, wz = weights(grid, position[p], base)
     bx, by, bz, lx, ly, lz = node_parts(grid, base)
@@ -86,8 +92,6 @@ def p2g(
         return
     scatter_together(
         raw,
-        fill,
-        wp.static(EXPANDS),
         wp.where(on, s0 * 64 + lx[0] + ly[0] + lz[0], -1),
         stencil(bx, by, bz, lx, ly, lz),
         s0,
@@ -104,10 +108,10 @@ def p2g(
         m * velocity[p] - a * f,
         m,
         a,
-        volume[p] * phase.density,
     )
 
 
+@wp.kernel
 def grid_step(
     share: wp.vec3i,
     grid: Grid,
@@ -116,15 +120,12 @@ def grid_step(
     block_of: wp.array(dtype=int),
     table: wp.array(dtype=int),
     raw: wp.array(dtype=wp.vec4),
-    fill: wp.array(dtype=wp.vec4),
     dt: wp.array(dtype=float),
     force: wp.array(dtype=Force),
-    phases: wp.array2d(dtype=Phase),
     # outputs
     moving: wp.array(dtype=wp.vec4),
 ):
-    """Velocity of every node from momentum, gravity and walls; the fourth component is its density [kg/m^3], or, where
-    matter expands, the density that fresh matter of the same rest volume would have. `fill` is `raw` where it does not.
+    """Velocity of every node from momentum, gravity and walls; the fourth component is its density [kg/m^3].
 
     Ghost nodes behind a mirroring wall get the mirrored velocity of their partner, so that the gather sees a true
     mirror: zeroing them instead costs energy at every step.
@@ -147,7 +148,7 @@ def grid_step(
             if wall:
                 for axis in range(3):
                     near = node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
-                    held = grip(grid, world, node, axis, phases[world, 0].density, table, fill)
+                    held = grip(grid, world, node, axis, table, raw)
                     if near and held > 0.0:
                         hold = wp.min(hold, held)
                         touching[axis] = 1
@@ -163,11 +164,6 @@ def grid_step(
                 if wall:
                     v = wall_velocity(grid, inside, touching, v)
                 density = total[3] * grid.inv_volume
-                if wp.static(EXPANDS):
-                    if wall:
-                        density = folded(grid, world, inside, touching, table, fill)[3] * grid.inv_volume
-                    else:
-                        density = fill[t][3] * grid.inv_volume
                 if wall:
                     density *= plane_share(grid, inside)
                 result = wp.vec4(v[0], v[1], v[2], density)
@@ -176,6 +172,7 @@ def grid_step(
                         if inside[axis] != node[axis]:
                             kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
                             result = flipped(result, axis, kind)
+                    result = beside(grid, world, node, inside, touching, kick, result, table, raw)
                 if hold < 1.0:
                     result = hold * result + (1.0 - hold) * unbound(raw[t], kick, result[3])
         moving[t] = result
@@ -192,7 +189,10 @@ def g2p(
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
-    feedback: Feedback,
+    shifting: float,
+    outlet: Outlet,
+    row: wp.array(dtype=int),
+    exit: wp.array(dtype=wp.vec3),
     # outputs
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -209,54 +209,42 @@ def g2p(
     if p - world * capacity < count[world]:
         x = position[p]
         base = first_node(grid, x)
-        v = velocity[p]
-        if held[p] != CARRIED:  # what is clamped strains, but keeps its velocity
-            f, wx, wy, wz = weights(grid, x, base)
-            bx, by, bz, lx, ly, lz = node_parts(grid, base)
-            s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
-            v = wp.vec3(0.0, 0.0, 0.0)
-            density = float(0.0)
-            cx, cy, cz = wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0)
-            for o in range(3):
-                low = bx[o] == bx[0]
-                t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
-                t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
-                vx = wp.vec3(0.0, 0.0, 0.0)
-                for q in range(3):
-                    near = by[q] == by[0]
-                    u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
-                    vy = wp.vec3(0.0, 0.0, 0.0)
-                    for r in range(3):
-                        slot = wp.where(bz[r] == bz[0], u0, u1)
-                        node = load_vec4(moving, wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r])
-                        u = wz[r] * wp.vec3(node[0], node[1], node[2])
-                        density += wx[o] * wy[q] * wz[r] * node[3]
-                        vy += u
-                        cz += (wx[o] * wy[q] * (float(r) - f[2])) * u
-                    vx += wy[q] * vy
-                    cy += (wx[o] * wy[q] * (float(q) - f[1])) * vy
-                v += wx[o] * vx
-                cx += (wx[o] * (float(o) - f[0])) * vx
-            affine[p] = columns_scaled(wp.matrix_from_cols(cx, cy, cz), 4.0 * grid.inv_dx)
-            v = taken(p, v, density, phases[world, phase_of[p]], dt[world], feedback, held, velocity, volume_ratio)
+        f, wx, wy, wz = weights(grid, x, base)
+        bx, by, bz, lx, ly, lz = node_parts(grid, base)
+        s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
+        u = wp.vec4(0.0, 0.0, 0.0, 0.0)
+        cx, cy, cz = wp.vec4(0.0, 0.0, 0.0, 0.0), wp.vec4(0.0, 0.0, 0.0, 0.0), wp.vec4(0.0, 0.0, 0.0, 0.0)
+        for o in range(3):
+            low = bx[o] == bx[0]
+            t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
+            t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
+            plane = wp.vec4(0.0, 0.0, 0.0, 0.0)
+            for q in range(3):
+                near = by[q] == by[0]
+                u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
+                line = wp.vec4(0.0, 0.0, 0.0, 0.0)
+                for r in range(3):
+                    slot = wp.where(bz[r] == bz[0], u0, u1)
+                    node = wz[r] * load_vec4(moving, wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r])
+                    line += node
+                    cz += (wx[o] * wy[q] * (float(r) - f[2])) * node
+                plane += wy[q] * line
+                cy += (wx[o] * wy[q] * (float(q) - f[1])) * line
+            u += wx[o] * plane
+            cx += (wx[o] * (float(o) - f[0])) * plane
+        sums = wp.matrix_from_rows(u, cx, cy, cz)
+        c = affine_of(grid, sums)
+        affine[p] = c
+        v = wp.vec3(u[0], u[1], u[2])
+        v = taken(p, x, v, c, dt[world], outlet, row, exit, held, velocity, volume_ratio)
+        x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
         after = moved(grid, x, v, dt[world], p, position, velocity, fault)
         if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
             activate_stencil(grid, world, after, table, block_of, active, fault)
 
 
-@functools.cache
-def passes(expands: bool) -> SimpleNamespace:
-    """All passes, those that differ where matter expands compiled for this case: unused physics costs nothing."""
-    options = {"fast_math": True, "enable_backward": False}
-    special = {
-        law.__name__: wp.kernel(
-            rebound(law, {"EXPANDS": expands}),
-            name=f"{law.__name__}_{'expanding' if expands else 'plain'}",
-            module="unique",
-            module_options=options,
-        )
-        for law in (p2g, grid_step)
-    }
+def passes() -> SimpleNamespace:
+    """All passes."""
     return SimpleNamespace(
-        reset_blocks=reset_blocks, find_blocks=find_blocks, clear_grid=clear_grid, g2p=g2p, **special
+        reset_blocks=reset_blocks, find_blocks=find_blocks, clear_grid=clear_grid, p2g=p2g, grid_step=grid_step, g2p=g2p
     )

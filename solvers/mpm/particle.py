@@ -5,7 +5,7 @@ import warp as wp
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.crew import raise_fault
 from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import Phase, is_solid, too_fast
+from fluidbench.native.scene import STICK, Outlet, Phase, is_solid, too_fast
 
 from ..bind import warp_func
 from ..flow import pressure, strained
@@ -19,7 +19,9 @@ FAULT_STENCIL = 2
 # Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
 # they share: a beam falls slowly off it.
 ANCHOR = wp.constant(1.0e4)
+STEEPEST = wp.constant(1.0 / 6.0)  # D dt / dx^2 up to which explicit diffusion is stable in three dimensions
 ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
+PACKED = wp.constant(2.0)  # volume ratio, or one over it, beyond which nothing is let go [-]
 
 
 @wp.func
@@ -80,12 +82,32 @@ def inertia(mass: float, held: int):
 
 
 @wp.func
+def near_walls(grid: Grid, x: wp.vec3, c: wp.mat33):
+    """The affine field of what carries momentum, du/dz within reach of a no-slip wall times (1 + 2 (z / 1.5 dx)^2) / 3.
+
+    There u goes as z^2 (walls.beside), and the second moment of the weights about a particle is not dx^2 / 4: with that
+    of the open field each transfer amplifies u up to threefold; with this factor the largest eigenvalue of a transfer
+    is 1, for one particle as for many, wherever they are.
+    """
+    out = c
+    for axis in range(3):
+        gap = float(1.5)
+        if grid.lower_kind[axis] == STICK:
+            gap = wp.min(gap, (x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
+        if grid.upper_kind[axis] == STICK:
+            gap = wp.min(gap, (grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
+        out[axis, axis] = out[axis, axis] * (1.0 + 2.0 * (gap / 1.5) * (gap / 1.5)) / 3.0
+    return out
+
+
+@wp.func
 def stressed(
     grid: Grid,
     dt: float,
     phase: Phase,
     p: int,
     on: bool,
+    x: wp.vec3,
     affine: wp.array(dtype=wp.mat33),
     m: float,
     volume: wp.array(dtype=float),
@@ -102,7 +124,7 @@ def stressed(
     s = elastic_shear[p]
     a = wp.mat33()
     if held[p] == FREE:
-        a = m * c
+        a = m * near_walls(grid, x, c)
     if held[p] != CARRIED and on:
         j *= wp.max(1.0 + dt * wp.trace(c), 0.1)
         volume_ratio[p] = j
@@ -131,38 +153,57 @@ def contained(grid: Grid, x: wp.vec3):
     return out
 
 
-@wp.struct
-class Feedback:
-    """How the density on the grid corrects the volume ratio that particles integrate, and so drifts."""
-
-    rate: float  # over the wave speed [1/m]
-    tolerance: float  # overlap that is left alone [-]
-
-
 @wp.func
 def taken(
     p: int,
+    x: wp.vec3,
     gathered: wp.vec3,
-    density: float,
-    phase: Phase,
+    gradient: wp.mat33,
     dt: float,
-    feedback: Feedback,
+    outlet: Outlet,
+    row: wp.array(dtype=int),
+    exit: wp.array(dtype=wp.vec3),
     held: wp.array(dtype=int),
     velocity: wp.array(dtype=wp.vec3),
     volume_ratio: wp.array(dtype=float),
 ):
-    """Particle p takes the velocity that it gathered, if it is free, and corrects its volume where the grid is crowded;
-    returns the velocity that it moves with."""
-    v = gathered
+    """Particle p, at x, takes the velocity that it gathered, if it is free; returns the velocity that it moves with.
+
+    What is carried moves on at its own speed U whatever the grid does, what is free moves with the grid: where they
+    meet matter is crowded by U over the grid's speed there, which no velocity gradient shows. Flux is the same on both
+    sides, so that is the volume ratio with which matter is let go, as a mean over one spacing.
+    """
+    v = velocity[p]
     if held[p] == FREE:
+        v = gathered
         velocity[p] = v
-    else:
-        v = velocity[p]
-    j = volume_ratio[p]
-    crowding = j * density / phase.density - 1.0 - feedback.tolerance
-    if crowding > 0.0 and crowding < ANCHORED and not is_solid(phase):
-        volume_ratio[p] = j * (1.0 - wp.min(dt * feedback.rate * phase.wave_speed * crowding, 0.1))
+    elif held[p] == CARRIED:
+        # the grid's speed at the outlet, down which matter moves along z, beyond its own
+        ahead = gathered[2] + gradient[2, 2] * (exit[row[0]][2] - x[2]) - v[2]
+        j = volume_ratio[p]
+        left = wp.clamp(1.0 - ahead / outlet.speed, 1.0 / PACKED, PACKED)
+        volume_ratio[p] = j + wp.min(outlet.speed * dt / outlet.spacing, 1.0) * (left - j)
     return v
+
+
+@wp.func
+def shifted(grid: Grid, phase: Phase, sums: wp.mat44, c: wp.mat33, step: float, volume_ratio: float, held: int):
+    """How far a particle is shifted out of a crowd [m]: -step |2 dev D| dx^2 grad(rho) / rho0, where rho J > rho0.
+
+    Matter that is stretched beyond the width of a cell leaves gaps between its particles that no stress holds open,
+    and its volume is lost. Shifting fills them (Fick's law, Lind et al. 2012), in proportion to the strain that makes
+    them: what rests, flies or turns is left alone.
+    """
+    by = wp.vec3(0.0, 0.0, 0.0)
+    crowding = sums[0, 3] * volume_ratio / phase.density
+    if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
+        d = 0.5 * (c + wp.transpose(c))
+        strain = wp.sqrt(wp.max(2.0 * (wp.ddot(d, d) - wp.trace(d) * wp.trace(d) / 3.0), 0.0))
+        # 4 sum w rho (x_i - x) is dx^2 grad(rho)
+        by = -(wp.min(step * strain, STEEPEST) * 4.0 / phase.density) * wp.cw_mul(
+            wp.vec3(sums[1, 3], sums[2, 3], sums[3, 3]), grid.dx
+        )
+    return by
 
 
 @wp.func

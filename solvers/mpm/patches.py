@@ -5,22 +5,16 @@ patches that overlap at a node are then added up in one order, whatever the numb
 in the same way, once it holds the velocities.
 """
 
-import functools
-
 import warp as wp
 
-from fluidbench.method.frame import CARRIED
 from fluidbench.native.crew import index_of
-from fluidbench.native.scene import Phase
+from fluidbench.native.scene import Outlet, Phase
 
-from ..bind import rebound
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
-from .particle import Feedback, affine_of, inertia, moved, stressed, taken, weights
+from .particle import affine_of, inertia, moved, shifted, stressed, taken, weights
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
-
-EXPANDS = False  # whether rest densities may differ, see `transfers`
 
 
 @wp.func_native(
@@ -94,6 +88,7 @@ def taken_from_nodes(
     ...
 
 
+@wp.kernel
 def scatter(
     share: wp.vec3i,
     lanes: int,
@@ -120,30 +115,35 @@ def scatter(
         start = h * PATCH
         for k in range(PATCH):
             homes.patch[start + k] = wp.vec4(0.0, 0.0, 0.0, 0.0)
-            if wp.static(EXPANDS):
-                homes.fill[start + k] = 0.0
         for member in range(homes.first[h], homes.first[h] + homes.number[h]):
             p = homes.members[member]
             world = p / capacity
             phase = phases[world, phase_of[p]]
             m = inertia(mass[p], held[p])
             a = stressed(
-                grid, dt[world], phase, p, True, affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear
+                grid,
+                dt[world],
+                phase,
+                p,
+                True,
+                position[p],
+                affine,
+                m,
+                volume,
+                held,
+                volume_ratio,
+                elastic_normal,
+                elastic_shear,
             )
             base = first_node(grid, position[p])
             f, wx, wy, wz = weights(grid, position[p], base)
             momentum = m * velocity[p] - a * f
             at = start + place_in_patch(grid, base)
             add_to_nodes(homes.patch, at, wx, wy, wz, momentum, m, a)
-            if wp.static(EXPANDS):
-                for o in range(3):
-                    for q in range(3):
-                        for r in range(3):
-                            k = at + (o * SIDE + q) * SIDE + r
-                            homes.fill[k] = homes.fill[k] + wx[o] * wy[q] * wz[r] * volume[p] * phase.density
         h += 1
 
 
+@wp.kernel
 def add_up(
     share: wp.vec3i,
     lanes: int,
@@ -154,7 +154,6 @@ def add_up(
     homes: Homes,
     # outputs
     raw: wp.array(dtype=wp.vec4),
-    fill: wp.array(dtype=wp.vec4),
 ):
     """Momentum and mass of every node, emptied before: the sum over all patches that hold it."""
     slot = index_of(share, wp.tid())
@@ -175,8 +174,6 @@ def add_up(
                         at = h * PATCH + ((place[0] + i) * SIDE + place[1] + j) * SIDE + place[2]
                         for k in range(size[2]):
                             raw[to + k] = raw[to + k] + homes.patch[at + k]
-                            if wp.static(EXPANDS):
-                                fill[to + k] = fill[to + k] + wp.vec4(0.0, 0.0, 0.0, homes.fill[at + k])
         slot += lanes
 
 
@@ -192,7 +189,10 @@ def gather(
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
-    feedback: Feedback,
+    shifting: float,
+    outlet: Outlet,
+    row: wp.array(dtype=int),
+    exit: wp.array(dtype=wp.vec3),
     # outputs
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -226,40 +226,16 @@ def gather(
             p = homes.members[member]
             x = position[p]
             base = first_node(grid, x)
-            v = velocity[p]
-            if held[p] != CARRIED:  # what is clamped strains, but keeps its velocity
-                at = start + place_in_patch(grid, base)
-                f, wx, wy, wz = weights(grid, x, base)
-                sums = taken_from_nodes(homes.patch, at, wx, wy, wz, f)
-                affine[p] = affine_of(grid, sums)
-                v = taken(
-                    p,
-                    wp.vec3(sums[0, 0], sums[0, 1], sums[0, 2]),
-                    sums[0, 3],
-                    phases[world, phase_of[p]],
-                    dt[world],
-                    feedback,
-                    held,
-                    velocity,
-                    volume_ratio,
-                )
+            f, wx, wy, wz = weights(grid, x, base)
+            sums = taken_from_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, f)
+            c = affine_of(grid, sums)
+            affine[p] = c
+            v = wp.vec3(sums[0, 0], sums[0, 1], sums[0, 2])
+            v = taken(p, x, v, c, dt[world], outlet, row, exit, held, velocity, volume_ratio)
+            x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
             after = moved(grid, x, v, dt[world], p, position, velocity, fault)
             if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
                 activate_stencil(grid, world, after, table, block_of, active, fault)
                 if home_of(grid, after) != home_of(grid, base):
                     homes.outdated[0] = 1
         h += 1
-
-
-@functools.cache
-def transfers(expands: bool) -> tuple[wp.Kernel, wp.Kernel]:
-    """`scatter` and `add_up`, compiled for matter that expands or does not."""
-    return tuple(
-        wp.kernel(
-            rebound(law, {"EXPANDS": expands}),
-            name=f"{law.__name__}_{'expanding' if expands else 'plain'}",
-            module="unique",
-            module_options={"fast_math": True, "enable_backward": False},
-        )
-        for law in (scatter, add_up)
-    )

@@ -27,7 +27,7 @@ from ..theory import mpm_numbers, stable_dt
 from . import kernels_warp as kernels
 from .by_block import ByBlock
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
-from .particle import FAULT_STENCIL, Feedback
+from .particle import FAULT_STENCIL
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
 ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
@@ -38,10 +38,9 @@ class ConfigMPM(Config):
     grid_ratio: Annotated[float, Field(ge=1.0, le=4.0)] = Field(2.0, description="grid spacing over particle spacing")
     safety: Annotated[float, Field(gt=0, le=1.0)] = Field(0.8, description="share of the exact stability limit used")
     advection: Annotated[float, Field(gt=0, lt=1.0)] = Field(0.5, description="cells that matter may cross in a step")
-    volume_feedback: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.1, description="rate, in c / dx, at which overlap seen on the grid corrects the integrated volume"
+    shifting: Annotated[float, Field(ge=0)] = Field(
+        8.0, description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2"
     )
-    volume_tolerance: Annotated[float, Field(ge=0)] = Field(1e-3, description="overlap that is left alone")
     blocks_per_particle: Annotated[float, Field(gt=0, le=8)] = Field(0.5, description="grid blocks to preallocate")
 
 
@@ -81,7 +80,7 @@ class SolverMPM(Solver):
         return [
             Economy("coarser grid", {"grid_ratio": round(min(1.33 * config.grid_ratio, 4.0), 3)}),
             Economy("larger dt", {"safety": 1.0}),
-            Economy("no volume feedback", {"volume_feedback": 0.0}),
+            Economy("no shifting", {"shifting": 0.0}),
         ]
 
     @classmethod
@@ -119,9 +118,7 @@ class SolverMPM(Solver):
         self.threads = threads
         self.kernels = self.kernels_of(backend)
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
-        self.feedback = Feedback()
-        self.feedback.rate = config.volume_feedback / min(self.grid.dx)
-        self.feedback.tolerance = max(config.volume_tolerance, aging.DISORDER if scene.expands else 0.0)
+        self.shifting = 0.0 if scene.expands else config.shifting  # mass does not tell how full a node is, then
         blocks = self.grid.blocks_per_world * scene.worlds
         slots = min(blocks, 512 + int(config.blocks_per_particle * pool.size))
         pool.add_field("affine", wp.mat33)
@@ -134,7 +131,6 @@ class SolverMPM(Solver):
             self.active = wp.zeros(1, dtype=int)
             self.raw = wp.empty(slots * 64, dtype=NODE)
             self.moving = wp.empty(slots * 64, dtype=NODE)
-            self.fill = wp.empty(slots * 64, dtype=NODE) if scene.expands else self.raw
         self.started = False
         self.order = CellOrder(
             scene, pool, np.array(self.grid.dx), shift=0.5
@@ -148,8 +144,8 @@ class SolverMPM(Solver):
         if backend == "taichi":
             from . import kernels_taichi
 
-            return kernels_taichi.passes(self.scene.expands, alone=self.scene.device.is_cpu and self.threads == 1)
-        return kernels.passes(self.scene.expands)
+            return kernels_taichi.passes(alone=self.scene.device.is_cpu and self.threads == 1)
+        return kernels.passes()
 
     def refresh(self) -> None:
         pool, scene = self.pool, self.scene
@@ -206,13 +202,12 @@ class SolverMPM(Solver):
         )
 
     def clear_grid(self) -> None:
-        for nodes in [self.raw, self.fill] if self.scene.expands else [self.raw]:
-            self._launch("clear_grid", self.node_lanes, [self.active, self.node_lanes], [nodes])
+        self._launch("clear_grid", self.node_lanes, [self.active, self.node_lanes], [self.raw])
 
     def p2g(self) -> None:
         pool, scene = self.pool, self.scene
         if self.by_block is not None:
-            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, [self.raw, self.fill])
+            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, self.raw)
             return
         self._launch(
             "p2g",
@@ -232,7 +227,7 @@ class SolverMPM(Solver):
                 pool.held,
                 self.table,
             ],
-            [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, self.fill, pool.fault],
+            [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, pool.fault],
         )
 
     def grid_step(self) -> None:
@@ -247,18 +242,17 @@ class SolverMPM(Solver):
                 self.block_of,
                 self.table,
                 self.raw,
-                self.fill,
                 scene.dt,
                 scene.force,
-                scene.phases,
             ],
             [self.moving],
         )
 
     def g2p(self) -> None:
-        pool, scene = self.pool, self.scene
+        pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
         if self.by_block is not None:
-            self.by_block.g2p(self.grid, self.moving, self.feedback, self.table, self.block_of, self.active)
+            blocks = self.table, self.block_of, self.active
+            self.by_block.g2p(self.grid, self.moving, self.shifting, *blocks)
             return
         self._launch(
             "g2p",
@@ -272,7 +266,10 @@ class SolverMPM(Solver):
                 scene.phases,
                 pool.phase,
                 pool.held,
-                self.feedback,
+                self.shifting,
+                scene.outlet,
+                hours.row,
+                hours.exit,
             ],
             [
                 pool.position,
@@ -324,6 +321,6 @@ class SolverMPM(Solver):
         return {"memory": 5.0 * node * nodes, "cache": 2.0 * 27.0 * node * sum(self.pool.counts)}
 
     def footprint(self) -> dict[str, int]:
-        names = ("table", "block_of", "raw", "moving", *(["fill"] if self.scene.expands else []))
+        names = ("table", "block_of", "raw", "moving")
         more = {} if self.by_block is None else self.by_block.footprint()
         return {name: getattr(self, name).capacity for name in names} | more

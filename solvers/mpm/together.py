@@ -24,13 +24,13 @@ def stencil(bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i, lx: wp.vec3i, ly: wp.vec3i
 @wp.func_native(
     snippet="""
 #if defined(__CUDA_ARCH__)
-    // a particle: momentum and mass, three columns, weights along x, y and z beside fullness and code, slots
+    // a particle: momentum and mass, three columns, weights along x, y and z beside the code, slots
     __shared__ float4 store[128 * 9];
     const int lane = threadIdx.x & 31;
     float4* const own = store + threadIdx.x * 9;
     own[0] = make_float4(momentum[0], momentum[1], momentum[2], mass);
     for (int c = 0; c < 3; ++c) own[1 + c] = make_float4(a.data[0][c], a.data[1][c], a.data[2][c], 0.0f);
-    own[4] = make_float4(wx[0], wx[1], wx[2], full);
+    own[4] = make_float4(wx[0], wx[1], wx[2], 0.0f);
     own[5] = make_float4(wy[0], wy[1], wy[2], __int_as_float(code));
     own[6] = make_float4(wz[0], wz[1], wz[2], 0.0f);
     own[7] = make_float4(__int_as_float(s0), __int_as_float(s1), __int_as_float(s2), __int_as_float(s3));
@@ -46,7 +46,7 @@ def stencil(bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i, lx: wp.vec3i, ly: wp.vec3i
         const unsigned later = first == 31 ? 0u : heads >> (first + 1);
         const int end = later ? first + __ffs(later) : 32;
         if (lane < 27 && (here >> first & 1)) {
-            float x = 0.0f, y = 0.0f, z = 0.0f, w = 0.0f, fullness = 0.0f;
+            float x = 0.0f, y = 0.0f, z = 0.0f, w = 0.0f;
             const float4* it = all + first * 9;
             const int* const place = (const int*)it;
 #pragma unroll 4
@@ -58,7 +58,6 @@ def stencil(bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i, lx: wp.vec3i, ly: wp.vec3i
                 y += weight * (m.y + fo * ax.y + fq * ay.y + fr * az.y);
                 z += weight * (m.z + fo * ax.z + fq * ay.z + fr * az.z);
                 w += weight * m.w;
-                if (expands) fullness += weight * words[19];
             }
             const int i = place[23] >> (3 * o) & 7, j = place[23] >> (9 + 3 * q) & 7, k = place[23] >> (18 + 3 * r) & 7;
             const int slot = place[28 + (i >> 2) * 4 + (j >> 2) * 2 + (k >> 2)];
@@ -70,7 +69,6 @@ def stencil(bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i, lx: wp.vec3i, ly: wp.vec3i
             float* const sum = (float*)&raw.data[node];
             atomicAdd(sum, x); atomicAdd(sum + 1, y); atomicAdd(sum + 2, z); atomicAdd(sum + 3, w);
 #endif
-            if (expands) atomicAdd((float*)&fill.data[node] + 3, fullness);
         }
         first = end;
     }
@@ -88,15 +86,12 @@ def stencil(bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i, lx: wp.vec3i, ly: wp.vec3i
                     raw.data[node][c]
                         += weight * (momentum[c] + o * a.data[c][0] + q * a.data[c][1] + r * a.data[c][2]);
                 raw.data[node][3] += weight * mass;
-                if (expands) fill.data[node][3] += weight * full;
             }
 #endif
 """
 )
 def scatter_together(
     raw: wp.array(dtype=wp.vec4),
-    fill: wp.array(dtype=wp.vec4),
-    expands: bool,
     lowest: int,
     code: int,
     s0: int,
@@ -113,10 +108,8 @@ def scatter_together(
     momentum: wp.vec3,
     mass: float,
     a: wp.mat33,
-    full: float,
 ):
-    """Add w (momentum + a (o, q, r), mass) to `raw` at each of a particle's 27 nodes, and w full to `fill` where matter
-    expands. `lowest` is the first node, -1 for a thread that only keeps the others company; `code` is its `stencil`,
-    s0 to s7 the slots of the blocks. The whole warp must ask, in blocks of 128 threads (crew.BLOCK), for which
-    there is room."""
+    """Add w (momentum + a (o, q, r), mass) to `raw` at each of a particle's 27 nodes. `lowest` is the first node, -1
+    for a thread that only keeps the others company; `code` is its `stencil`, s0 to s7 the slots of the blocks. The
+    whole warp must ask, in blocks of 128 threads (crew.BLOCK), for which there is room."""
     ...

@@ -110,8 +110,8 @@ def test_a_viscous_block_on_a_sticking_face_is_held(method):
     assert abs(sliding(method, {"z_lower": "slip"}, duration=0.15, material=syrup)[0]) == pytest.approx(0.4, rel=1e-3)
 
 
-def test_overlap_seen_on_the_grid_of_mpm_relaxes_at_its_rate():
-    """dJ = -J dt 0.1 (c / dx) (J - 1 - 0.001) in a full period at rest, whose density on the grid is that at rest."""
+def test_the_volume_of_what_rests_is_left_alone_by_mpm():
+    """In a full period at rest nothing but strain may change J or move a particle, however crowded it says it is."""
     edge = 0.16
     s = scenario(
         domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS},
@@ -121,14 +121,12 @@ def test_overlap_seen_on_the_grid_of_mpm_relaxes_at_its_rate():
         material={"density": 1000.0, "sound_speed": 4.0, "youngs_modulus": 1e3, "yield_stress": 9.0},
     )
     sim = Simulation(s, "mpm")
-    dt = 1e-4
-    for start, rate in ((1.05, 0.049), (1.0005, 0.0), (0.97, 0.0)):
+    places = sim.pool.position.numpy()
+    for start in (1.05, 0.97):
         sim.pool.volume_ratio.fill_(start)
-        sim.march(dt, 1)
-        ratio = sim.pool.volume_ratio.numpy()[: sim.pool.counts[0]]
-        c = s.material.wave_speed(s.liquid_sound_speed)
-        expected = -start * dt * 0.1 * c / 0.02 * rate
-        assert ratio - start == pytest.approx(np.full(len(ratio), expected), rel=0.02, abs=2e-7)
+        sim.march(1e-4, 1)
+        assert sim.pool.volume_ratio.numpy()[: sim.pool.counts[0]] == pytest.approx(start, abs=2e-7)
+    assert sim.pool.position.numpy() == pytest.approx(places, abs=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from solvers.pbd.bonds import DAMPED
 from solvers.pbd.laws import conveyed_modulus
 
 TOLERANCE = 2e-5  # float32; sums may be taken in another order
-GRID = ("raw", "fill", "moving")
+GRID = ("raw", "moving")
 BY_CHANCE = ("table", "block_of")  # in the order in which threads come, on a GPU
 GARBAGE = 1.0e6  # in slots that nobody may touch
 OWN_LISTS = ("neighbours.entries", "neighbours.number", "neighbours.inside")  # each language goes through its own
@@ -74,10 +74,12 @@ class Twins:
         for _ in range(ticks):
             self.warp.advance_tick()
         self.taichi.pool.counts = list(self.warp.pool.counts)
+        for name in ("row", "exit"):  # where the nozzle is
+            wp.copy(getattr(self.taichi.scene.clock.hours, name), getattr(self.warp.scene.clock.hours, name))
         self.taichi.solver.started = True  # MPM gathers the affine field of its first state once
         self.ours, self.theirs = arrays_of(self.warp), arrays_of(self.taichi)
         self.shared = [name for name in self.ours if name in self.theirs and name not in OWN_LISTS]
-        for name in ("raw", "moving", "fill"):  # scratch that begins as it was found
+        for name in ("raw", "moving"):  # scratch that begins as it was found
             if name in self.ours:
                 self.ours[name].zero_()
         self.least = self._least_scales()

@@ -1,0 +1,157 @@
+"""MPM beside no-slip walls, at the outlet, and out of crowds: numbers worked out by hand."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.native.scene import Phase, Scene
+from solvers.mpm import grid as mpm_grid
+from solvers.mpm import particle as mpm
+from solvers.mpm import walls as mpm_walls
+
+from ..conftest import scenario
+
+DX = 0.02
+FIRST = int(mpm_grid.FIRST)
+
+
+def grid_with(**kinds):
+    s = scenario(domain={"lower": [0, 0, 0], "upper": [0.2, 0.2, 0.2], "walls": kinds}, spacing=0.01)
+    return mpm_grid.grid_of(Scene(s), DX)
+
+
+def column(grid, masses, momenta, axis=2, at=8):
+    """(table, raw) of a grid whose nodes in one column hold masses and momenta along the axis, from two cells behind
+    the lower wall on."""
+    blocks = grid.blocks_per_world
+    raw = np.zeros((blocks * 64, 4), np.float32)
+    for k, (mass, momentum) in enumerate(zip(masses, momenta, strict=True)):
+        node = [at, at, at]
+        node[axis] = FIRST - 2 + k
+        block = ((node[0] >> 2) * grid.blocks[1] + (node[1] >> 2)) * grid.blocks[2] + (node[2] >> 2)
+        place = block * 64 + ((node[0] & 3) << 4) + ((node[1] & 3) << 2) + (node[2] & 3)
+        raw[place, axis], raw[place, 3] = momentum, mass
+    table = wp.array(np.arange(1, blocks + 1, dtype=np.int32), dtype=int, device="cpu")
+    return table, wp.array(raw, dtype=wp.vec4, device="cpu")
+
+
+@pytest.mark.parametrize(("gap", "hold"), [(0.0, 1.0), (0.2, 1.0), (0.36, 0.0), (0.7, 0.0)])
+@pytest.mark.parametrize("width", [1.0, 0.3])
+def test_contact_goes_by_the_gap_and_not_by_the_width_that_is_filled(gap, hold, width):
+    grid = grid_with(z_lower="stick")
+    depth = np.arange(gap, 4.0, 1e-4) + 0.5e-4
+    masses = [width * 1e-4 * spline(depth - k).sum() for k in (-2, -1, 0, 1, 2, 3)]
+    table, raw = column(grid, masses, [0.0] * 6)
+    got = asked(ask_grip, float, grid, wp.vec3i(8, 8, FIRST + 1), table, raw)
+    assert got == pytest.approx(hold, abs=0.03)
+
+
+@wp.kernel
+def ask_grip(
+    grid: mpm_grid.Grid,
+    node: wp.vec3i,
+    table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4),
+    out: wp.array(dtype=float),
+):
+    out[0] = mpm_walls.grip(grid, 0, node, 2, table, raw)
+
+
+@wp.kernel
+def ask_beside(
+    grid: mpm_grid.Grid,
+    node: wp.vec3i,
+    inside: wp.vec3i,
+    kick: wp.vec3,
+    was: wp.vec4,
+    table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4),
+    out: wp.array(dtype=wp.vec4),
+):
+    out[0] = mpm_walls.beside(grid, 0, node, inside, wp.vec3i(0, 0, 1), kick, was, table, raw)
+
+
+def asked(kernel, kind, *arguments):
+    """What a kernel puts into the first place of its last array."""
+    out = wp.zeros(1, dtype=kind, device="cpu")
+    wp.launch(kernel, 1, [*arguments, out], device="cpu")
+    return out.numpy()[0]
+
+
+def spline(x):
+    x = np.abs(x)
+    return np.where(x < 0.5, 0.75 - x * x, np.where(x < 1.5, 0.5 * (1.5 - x) ** 2, 0.0))
+
+
+def test_matter_nears_a_no_slip_wall_with_the_square_of_its_distance():
+    """Nodal values -U/3, U, U give u(z) = 4/3 U z^2 up to half a cell, zero with its slope on the wall."""
+    z = np.linspace(0.0, 0.5, 11)
+    field = spline(z + 1) - spline(z) / 3 + spline(z - 1)
+    assert field == pytest.approx(4.0 / 3.0 * z * z, abs=1e-12)
+    grid = grid_with(z_lower="stick")
+    table, raw = column(grid, [0.0, 0.03, 0.45, 0.99, 1.0, 1.0], [0.0, 0.1, -0.3, 2.0, 0.0, 0.0])
+    mass, momentum = 0.99 + 0.03 - 0.15, 2.0 + 0.1 + 0.1
+    kick = wp.vec3(0.0, 0.0, -0.5)
+    for cells, factor in ((-1, 1.0), (0, -1.0 / 3.0), (1, 1.0)):
+        node, inside = wp.vec3i(8, 8, FIRST + cells), wp.vec3i(8, 8, FIRST + abs(cells))
+        was = wp.vec4(7.0, 8.0, 9.0, 10.0)
+        got = asked(ask_beside, wp.vec4, grid, node, inside, kick, was, table, raw)
+        assert list(got) == pytest.approx([7.0, 8.0, factor * (momentum / mass - 0.5), 10.0], rel=1e-5)
+    slip = grid_with(z_lower="slip")
+    node = wp.vec3i(8, 8, FIRST + 1)
+    got = asked(ask_beside, wp.vec4, slip, node, node, kick, wp.vec4(7.0, 8.0, 9.0, 10.0), table, raw)
+    assert list(got) == [7.0, 8.0, 9.0, 10.0]
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.25, 1.5, 2.0, 2.5])
+def test_no_transfer_beside_a_no_slip_wall_gains_energy(ratio):
+    """Eigenvalues of gather and scatter along the wall's normal, for rows of particles wherever they begin."""
+    from scipy.linalg import eigh
+
+    grid = grid_with(z_lower="stick")
+    worst = 0.0
+    for rows in (1, 2, 6):
+        for start in np.linspace(0.02, 1.0, 25):
+            z = (np.arange(rows) + start) / ratio
+            first = spline(z - 1) + spline(z + 1) - spline(z) / 3
+            slope = 4 * (spline(z - 1) * (1 - z) - spline(z + 1) * (1 + z) + spline(z) * z / 3)
+            values = np.stack([first] + [spline(z - k) for k in range(2, 9)])
+            slopes = np.stack([slope] + [4 * spline(z - k) * (k - z) for k in range(2, 9)])
+            kept = [near_wall(grid, height) for height in z]
+            transfer = values @ values.T + (slopes * kept) @ slopes.T / 4
+            mass = values.sum(axis=1)
+            used = mass > 1e-6
+            worst = max(worst, eigh(transfer[np.ix_(used, used)], np.diag(mass[used]), eigvals_only=True)[-1])
+    assert worst == pytest.approx(1.0, abs=2e-3)
+
+
+def near_wall(grid, height):
+    """What is left of du/dz so many cells above the floor."""
+    c = wp.mat33(*np.ones(9, np.float32))
+    got = np.array(mpm.near_walls(grid, wp.vec3(0.1, 0.1, float(height) * DX), c)).reshape(3, 3)
+    assert np.delete(got.ravel(), 8) == pytest.approx(1.0)
+    return got[2, 2]
+
+
+def shifted(c, density=1.1, lean=(0.1, 0.0, -0.2), held=FREE, ratio=1.0, yield_stress=10.0, step=1e-3):
+    phase = Phase()
+    phase.density, phase.shear_modulus, phase.yield_stress = 1.0, 1e3, yield_stress
+    sums = np.zeros((4, 4), np.float32)
+    sums[:, 3] = [density, *lean]
+    rows = wp.mat44(*sums.ravel())
+    return np.array(mpm.shifted(grid_with(), phase, rows, wp.mat33(*np.ravel(c)), step, ratio, int(held)))
+
+
+def test_particles_leave_a_crowd_as_fast_as_matter_shears():
+    shear = np.zeros((3, 3))
+    shear[0, 2] = 5.0  # rate 5 1/s
+    assert shifted(shear) == pytest.approx(-1e-3 * 5.0 * 4.0 * DX * np.array([0.1, 0.0, -0.2]), rel=1e-5)
+    assert shifted(1e6 * shear) == pytest.approx(-4.0 / 6.0 * DX * np.array([0.1, 0.0, -0.2]), rel=1e-5)  # no farther
+    turn = np.array([[0.0, -5.0, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    still = np.zeros((3, 3))
+    for left_alone in (still, turn, 3.0 * np.eye(3)):
+        assert shifted(left_alone) == pytest.approx(0.0, abs=1e-9)
+    for more in ({"density": 0.99}, {"ratio": 0.9}, {"density": 1e4}, {"held": CLAMPED}, {"held": CARRIED}):
+        assert not shifted(shear, **more).any()
+    assert not shifted(shear, yield_stress=1e3).any()  # a solid's volume is its strain
