@@ -28,6 +28,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     import pandas as pd
 
     from ..measure.ledger import final_lengths, ledger, lengths
+    from ..measure.order import creep, departures, order
     from ..measure.reference import answers
     from ..measure.tower import is_tower, success, verdict_of
 
@@ -57,7 +58,11 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     write_npz(folder / FINAL_FRAME, frame)
     frames = [frame_name(i) for i in range(len(rows))] if job.keep_frames else []
     complete = outcome.verdict is Verdict.COMPLETED
-    final = {**ledger(frame, scenario), **final_lengths(frame, scenario)} if complete else {}
+    final = (
+        {**ledger(frame, scenario), **final_lengths(frame, scenario), **order(frame, scenario), **creep(series)}
+        if complete
+        else {}
+    )
     compared, not_compared = answers(scenario, series, final) if complete else ([], [])
     criteria = success(scenario, final, series) if complete and is_tower(scenario) else []
     record = Record(
@@ -75,7 +80,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         bounds_s={b.name: b.dt for b in session.bounds()},
         binding_s=outcome.binding,
         approximations=tuple(approximations(method, scenario, session.config)),
-        warnings=tuple(scenario.warnings() + undrawn + _numberless(final)),
+        warnings=tuple(scenario.warnings() + undrawn + _numberless(final) + departures(final)),
         config=session.config.model_dump(),
         input=scenario.model_dump(mode="json"),
         machine=about,
