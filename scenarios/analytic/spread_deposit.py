@@ -55,5 +55,8 @@ CASE = Case(
     tolerance=0.08,
     scenarios=scenarios,
     evaluate=evaluate,
+    causes={
+        "mpm": "first order in a deposit five cells thick: 4 % short in radius at H / 20, 0.5 % in slump at H / 60",
+    },
     exempt={"pbd": "shear stiffness is limited by the time step"},
 )
