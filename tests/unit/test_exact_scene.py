@@ -209,3 +209,17 @@ def test_a_step_of_time_is_positive_and_reaches_every_world():
             scene.set_dt(dt)
     scene.allow_tension()
     assert scene.phases.numpy()["tension_limit"].ravel().tolist() == pytest.approx([float(NEVER_YIELDS)] * 2)
+
+
+def test_matter_cavitates_at_the_tension_that_the_scenario_gives():
+    """Else a liquid does at once, and what has strength never."""
+    never = float(NEVER_YIELDS)
+    paste = {"youngs_modulus": 1e4, "yield_stress": 50.0}
+    for more, limit in (
+        ({}, 0.0),
+        (paste, never),
+        ({"tension_limit": 80.0}, 80.0),
+        (paste | {"tension_limit": 9.0}, 9.0),
+    ):
+        table = Scene(scenario(material={"density": 1000.0, **more})).phases.numpy()
+        assert table["tension_limit"].ravel().tolist() == pytest.approx([limit])
