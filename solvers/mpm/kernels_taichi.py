@@ -140,7 +140,7 @@ def g2p(
                     amount = ti.min(shifting * h * ti.sqrt(2.0 * strain.norm_sqr()), STEEPEST)
                     x -= (4.0 * amount / phase.density) * lean * grid.dx
             elif held[p] == CARRIED:
-                ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] - x[2]) - v[2]
+                ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] + 0.5 * outlet.spacing - x[2]) - v[2]
                 left = ti.math.clamp(1.0 - ahead / outlet.speed, 1.0 / PACKED, PACKED)
                 volume_ratio[p] += ti.min(outlet.speed * h / outlet.spacing, 1.0) * (left - volume_ratio[p])
             free = x + h * v

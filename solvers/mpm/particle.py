@@ -178,8 +178,8 @@ def taken(
         v = gathered
         velocity[p] = v
     elif held[p] == CARRIED:
-        # the grid's speed at the outlet, down which matter moves along z, beyond its own
-        ahead = gathered[2] + gradient[2, 2] * (exit[row[0]][2] - x[2]) - v[2]
+        # the grid's speed beyond its own, half a spacing above the outlet: from there on its own gradient tells
+        ahead = gathered[2] + gradient[2, 2] * (exit[row[0]][2] + 0.5 * outlet.spacing - x[2]) - v[2]
         j = volume_ratio[p]
         left = wp.clamp(1.0 - ahead / outlet.speed, 1.0 / PACKED, PACKED)
         volume_ratio[p] = j + wp.min(outlet.speed * dt / outlet.spacing, 1.0) * (left - j)
