@@ -5,9 +5,11 @@ Taichi recognises and uses in place; nobody reads such a header on the host.
 """
 
 import contextlib
+import ctypes
 import functools
 import io
 import os
+import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -37,6 +39,13 @@ REPLAYS = ti.__name__ == "taichi" and ti.__version__[:2] == (1, 7)  # others lau
 _running: list[tuple[str, int]] = []  # architecture and threads, once started
 
 
+def _keep_the_smallest_numbers() -> None:
+    """Taichi tells the processor to take the smallest numbers for zero, in all of this process: 1e-310 would be read as
+    0.0 from then on. Back to the default environment of C's <fenv.h>, FE_DFL_ENV."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).fesetenv(ctypes.c_void_p(-1))
+
+
 def start(device: str, threads: int) -> None:
     """Start Taichi for a device, once in a process; raises UserError when it runs with other settings already."""
     wanted = ("cpu" if device == "cpu" else "cuda", threads)
@@ -50,6 +59,7 @@ def start(device: str, threads: int) -> None:
                 offline_cache=True,
                 log_level=ti.ERROR,
             )
+        _keep_the_smallest_numbers()
         if ti.cfg.arch not in ({ti.x64, ti.arm64} if wanted[0] == "cpu" else {ti.cuda}):
             raise UserError(f"taichi could not start on {wanted[0]} and took {ti.cfg.arch} instead")
         _running.append(wanted)

@@ -5,7 +5,6 @@ no float32 itself; quantities that are positive by nature are divided by, and th
 """
 
 import math
-import struct
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
@@ -56,7 +55,7 @@ class Model(BaseModel):
         for number in numbers:
             if info.field_name not in cls.judged_later:
                 check_number(number)
-            if not ratio and abs(number) < LEAST and not is_nothing(number):
+            if not ratio and 0 < abs(number) < LEAST:
                 raise ValueError(f"{number:.3g} is beyond any physics; {LEAST:g} is the least that is not nothing")
         return value
 
@@ -96,12 +95,6 @@ def _leaves(value: Any) -> list[Any]:
     if isinstance(value, list | tuple):
         return [leaf for part in value for leaf in _leaves(part)]
     return [value]
-
-
-def is_nothing(value: float) -> bool:
-    """Whether a number is zero, by its bits: once a library has switched the processor to flush the smallest numbers to
-    zero, comparison takes them for it."""
-    return not any(struct.pack("<d", value)[:7]) and struct.pack("<d", value)[7] in (0x00, 0x80)
 
 
 def check_number(value: float) -> None:

@@ -160,3 +160,8 @@ def test_preparing_changes_nothing(method, name):
     sim.prepare()
     for key, array in arrays.items():
         assert np.array_equal(before[key], array.numpy()), key
+
+
+def test_the_smallest_numbers_are_still_numbers_beside_taichi():
+    Simulation(CASES["liquid"], "mpm", Target("cpu", "taichi", 1))
+    assert float("5e-324") > 0.0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fluidbench.scenario import Domain, Nozzle, Walls
-from fluidbench.scenario.model import is_nothing
 
 from ..conftest import G, bead, scenario
 
@@ -164,8 +163,3 @@ def test_a_nozzle_has_a_speed_or_a_rate():
     for more in ({}, {"exit_speed": 1.0, "flow_rate": 1.0}):
         with pytest.raises(ValueError, match="exactly one of exit_speed and flow_rate"):
             Nozzle(diameter=0.01, standoff=1.0, **more)
-
-
-def test_the_smallest_numbers_are_told_from_nothing_whatever_the_processor_flushes():
-    assert [is_nothing(value) for value in (0.0, -0.0, 0)] == [True] * 3
-    assert not any(is_nothing(value) for value in (5e-324, -5e-324, 1e-300, 1.0, -2))
