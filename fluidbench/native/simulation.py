@@ -165,6 +165,8 @@ class Simulation(Session):
             if audited:
                 self._audit()
             self._age(feeding)
+            self.scene.clock.strike()
+            self.scene.clock.struck()
             self._refresh()
             self.scene.set_dt(steps.dt)
             self._run(steps.substeps)

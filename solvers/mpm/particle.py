@@ -157,7 +157,7 @@ def contained(grid: Grid, x: wp.vec3):
 def taken(
     p: int,
     x: wp.vec3,
-    gathered: wp.vec3,
+    sums: wp.mat44,
     gradient: wp.mat33,
     dt: float,
     outlet: Outlet,
@@ -167,13 +167,15 @@ def taken(
     velocity: wp.array(dtype=wp.vec3),
     volume_ratio: wp.array(dtype=float),
 ):
-    """Particle p, at x, takes the velocity that it gathered, if it is free; returns the velocity that it moves with.
+    """Particle p, at x, takes the velocity that it gathered (the sums' first row), if it is free; returns that which it
+    moves with.
 
     What is carried moves on at its own speed U whatever the grid does, what is free moves with the grid: where they
     meet matter is crowded by U over the grid's speed there, which no velocity gradient shows. Flux is the same on both
     sides, so that is the volume ratio with which matter is let go, as a mean over one spacing.
     """
     v = velocity[p]
+    gathered = wp.vec3(sums[0, 0], sums[0, 1], sums[0, 2])
     if held[p] == FREE:
         v = gathered
         velocity[p] = v

@@ -230,8 +230,7 @@ def gather(
             sums = taken_from_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, f)
             c = affine_of(grid, sums)
             affine[p] = c
-            v = wp.vec3(sums[0, 0], sums[0, 1], sums[0, 2])
-            v = taken(p, x, v, c, dt[world], outlet, row, exit, held, velocity, volume_ratio)
+            v = taken(p, x, sums, c, dt[world], outlet, row, exit, held, velocity, volume_ratio)
             x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
             after = moved(grid, x, v, dt[world], p, position, velocity, fault)
             if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
-from fluidbench.native.scene import Phase, Scene
+from fluidbench.native.scene import Outlet, Phase, Scene
 from solvers.mpm import grid as mpm_grid
 from solvers.mpm import particle as mpm
 from solvers.mpm import walls as mpm_walls
@@ -155,3 +155,44 @@ def test_particles_leave_a_crowd_as_fast_as_matter_shears():
     for more in ({"density": 0.99}, {"ratio": 0.9}, {"density": 1e4}, {"held": CLAMPED}, {"held": CARRIED}):
         assert not shifted(shear, **more).any()
     assert not shifted(shear, yield_stress=1e3).any()  # a solid's volume is its strain
+
+
+@wp.kernel
+def ask_taken(
+    sums: wp.mat44,
+    c: wp.mat33,
+    dt: float,
+    outlet: Outlet,
+    row: wp.array(dtype=int),
+    exit: wp.array(dtype=wp.vec3),
+    held: wp.array(dtype=int),
+    velocity: wp.array(dtype=wp.vec3),
+    volume_ratio: wp.array(dtype=float),
+    out: wp.array(dtype=wp.vec3),
+):
+    out[0] = mpm.taken(0, wp.vec3(0.0, 0.0, 0.1), sums, c, dt, outlet, row, exit, held, velocity, volume_ratio)
+
+
+@pytest.mark.parametrize("below", [0.05, 0.1, 0.2, 0.5])
+def test_matter_leaves_the_nozzle_as_dense_as_the_grid_below_crowds_it(below):
+    """Carried at U = 0.1 m/s towards a grid that moves at `below` half a spacing above the exit: J goes to u / U."""
+    outlet = Outlet()
+    outlet.spacing, outlet.speed = 0.01, 0.1
+    exit_height, slope, dt = 0.098, 2.0, 0.05
+    at_particle = -below - slope * (exit_height + 0.005 - 0.1)  # the linear field that is -below there
+    sums, c = np.zeros((4, 4), np.float32), np.zeros((3, 3), np.float32)
+    sums[0, 2], c[2, 2] = at_particle, slope
+    one = {"dtype": int, "device": "cpu"}
+    for held, moves, ratio in (
+        (CARRIED, -0.1, 1.0 + 0.5 * (min(max(below / 0.1, 0.5), 2.0) - 1.0)),
+        (FREE, at_particle, 1.0),
+        (CLAMPED, -0.1, 1.0),
+    ):
+        velocity = wp.array([[0.0, 0.0, -0.1]], dtype=wp.vec3, device="cpu")
+        kept = wp.array([1.0], dtype=float, device="cpu")
+        row, exits = wp.array([1], **one), wp.array([[9.0] * 3, [0.0, 0.0, exit_height]], dtype=wp.vec3, device="cpu")
+        given = [wp.mat44(*sums.ravel()), wp.mat33(*c.ravel()), dt, outlet, row, exits]
+        got = asked(ask_taken, wp.vec3, *given, wp.array([int(held)], **one), velocity, kept)
+        assert list(got) == pytest.approx([0.0, 0.0, moves], rel=1e-5)
+        assert velocity.numpy()[0, 2] == pytest.approx(moves, rel=1e-5)
+        assert kept.numpy()[0] == pytest.approx(ratio, rel=1e-5)
