@@ -56,7 +56,7 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     causes={
-        "mpm": "a deposit five cells thick: 0.148 at H / 20, 0.098 at H / 40 (order 0.6); 4 % short in radius at H / 20",
+        "mpm": "a deposit five cells thick: 0.148 at H / 20, 0.098 at H / 40; 4 % short in radius at H / 20",
     },
     exempt={"pbd": "shear stiffness is limited by the time step"},
 )
