@@ -24,11 +24,20 @@ relieved = warp_func(constitutive.relieved)
 
 
 @wp.func
+def relief(before: Phase, after: Phase):
+    """What shear strain is multiplied by where the modulus changes and stress carries over."""
+    ratio = float(0.0)
+    if after.shear_modulus > 0.0:
+        ratio = wp.min(before.shear_modulus / after.shear_modulus, 1.0e3)
+    return ratio
+
+
+@wp.func
 def relieved_tensor(before: Phase, after: Phase, b: wp.vec3, s: wp.vec3):
     """The elastic tensor (diagonal b, s: xy, xz, yz) that carries the shear stress over to another modulus."""
     if after.shear_modulus <= 0.0:
         return wp.vec3(1.0, 1.0, 1.0), wp.vec3(0.0, 0.0, 0.0)
-    ratio = wp.min(before.shear_modulus / after.shear_modulus, 1.0e3)
+    ratio = relief(before, after)
     b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = relieved(b[0], b[1], b[2], s[0], s[1], s[2], ratio)
     return wp.vec3(b_xx, b_yy, b_zz), wp.vec3(b_xy, b_xz, b_yz)
 
@@ -157,8 +166,9 @@ def harden_at_density(
     volume: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
     elastic_shear: wp.array(dtype=wp.vec3),
+    off_linear: wp.array(dtype=wp.vec3),
 ):
-    """The same for a method that integrates density, which stays."""
+    """The same for a method that integrates density, which stays, and the strain that no gradient shows."""
     i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and due[i] != phase_of[i]:
@@ -166,5 +176,6 @@ def harden_at_density(
         phase_of[i] = due[i]
         if elastic == 1:
             relieve(before, after, i, elastic_normal, elastic_shear)
+            off_linear[i] = relief(before, after) * off_linear[i]
         compression = density[i] / rest_density(mass, volume, i) - 1.0
         volume[i] = mass[i] * (1.0 + carried_compression(before, after, compression)) / density[i]

@@ -77,7 +77,8 @@ def strain_and_flow(
     relaxation: float,
     dt: float,
 ):
-    """b after a step dt [s] under the velocity gradient l_ij = dv_i/dx_j [1/s]: (xx, yy, zz, xy, xz, yz).
+    """b after a step dt [s] under the velocity gradient l_ij = dv_i/dx_j [1/s]: (xx, yy, zz, xy, xz, yz); and the share
+    of the trial's deviator that was kept.
 
     Trial: b <- A b A^T, A = 1 + dt dev(l). With relaxation = 0, sqrt(J2) = G |dev b| / sqrt(2) returns to
     `flow_stress`, and b is scaled back to det b = 1 (one Newton step for the cube root). Otherwise b is the
@@ -133,7 +134,8 @@ def strain_and_flow(
     if relaxation > 0.0:
         unit = exp(-relaxation * dt)
         rest = 1.0 - unit
-    return c_xx * unit + rest, c_yy * unit + rest, c_zz * unit + rest, c_xy * unit, c_xz * unit, c_yz * unit
+        keep = keep * unit
+    return c_xx * unit + rest, c_yy * unit + rest, c_zz * unit + rest, c_xy * unit, c_xz * unit, c_yz * unit, keep
 
 
 def relieved(b_xx: float, b_yy: float, b_zz: float, b_xy: float, b_xz: float, b_yz: float, ratio: float):

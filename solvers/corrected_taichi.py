@@ -8,12 +8,18 @@ from .taichi_bridge import symmetric, ti
 
 
 @ti.func
+def least_eigenvalue(m):
+    """4 det / trace^2: a lower bound on the least eigenvalue of a positive symmetric matrix."""
+    trace = m.trace()
+    return 4.0 * m.determinant() / ti.max(trace * trace, 1.0e-12)
+
+
+@ti.func
 def symmetric_inverse(m):
     """Inverse of a moment matrix, faded into the identity as 4 det / trace^2, a bound on its least eigenvalue, falls
     from SOUND to SINGULAR."""
     inverse = ti.Matrix.identity(ti.f32, 3)
-    trace = m.trace()
-    least = 4.0 * m.determinant() / ti.max(trace * trace, 1.0e-12)
+    least = least_eigenvalue(m)
     if least > SINGULAR:
         share = ti.min((least - SINGULAR) / (SOUND - SINGULAR), 1.0)
         inverse = share * m.inverse() + (1.0 - share) * inverse

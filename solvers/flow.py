@@ -15,8 +15,9 @@ strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stre
 
 @wp.func
 def strained(phase: Phase, modulus: float, l: wp.mat33, b: wp.vec3, s: wp.vec3, h: float):
-    """The elastic tensor after a step h [s] under the velocity gradient l: its diagonal b, and s: xy, xz, yz."""
-    xx, yy, zz, xy, xz, yz = strain_and_flow(
+    """The elastic tensor after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz, yz; the share
+    of its deviator that was kept."""
+    xx, yy, zz, xy, xz, yz, kept = strain_and_flow(
         l[0, 0], l[0, 1], l[0, 2],
         l[1, 0], l[1, 1], l[1, 2],
         l[2, 0], l[2, 1], l[2, 2],
@@ -28,4 +29,4 @@ def strained(phase: Phase, modulus: float, l: wp.mat33, b: wp.vec3, s: wp.vec3, 
         phase.relaxation_rate,
         h,
     )  # fmt: skip
-    return wp.vec3(xx, yy, zz), wp.vec3(xy, xz, yz)
+    return wp.vec3(xx, yy, zz), wp.vec3(xy, xz, yz), kept

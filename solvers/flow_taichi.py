@@ -9,8 +9,9 @@ strain_and_flow = taichi_func(constitutive.strain_and_flow, constitutive.flow_st
 
 @ti.func
 def strained(phase, modulus, l, b, s, h):
-    """The elastic tensor after a step h [s] under the velocity gradient l: its diagonal b, and s: xy, xz, yz."""
-    xx, yy, zz, xy, xz, yz = strain_and_flow(
+    """The elastic tensor after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz, yz; the share
+    of its deviator that was kept."""
+    xx, yy, zz, xy, xz, yz, kept = strain_and_flow(
         l[0, 0],
         l[0, 1],
         l[0, 2],
@@ -33,4 +34,4 @@ def strained(phase, modulus, l, b, s, h):
         phase.relaxation_rate,
         h,
     )
-    return vec3(xx, yy, zz), vec3(xy, xz, yz)
+    return vec3(xx, yy, zz), vec3(xy, xz, yz), kept

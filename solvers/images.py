@@ -91,19 +91,14 @@ def image_gradient(box: Box, g: wp.vec3, code: int):
 
 
 @wp.func
-def image_rate(box: Box, g: wp.mat33, code: int):
-    """A velocity gradient dv_i/dx_j seen in the walls, consistent with `image_velocity`."""
+def image_traction(box: Box, g: wp.vec3, code: int):
+    """What pulls matter back to its neighbours' linear flow, seen in the walls. No-slip walls leave it as it is: a flow
+    that is bent at the wall is bent on behind it, and mirrored it would drag."""
     out = g
     for axis in range(3):
         kind = face_kind(box, code, axis)
-        if kind != PERIODIC:
-            for b in range(3):
-                out[b, axis] = -out[b, axis]
-            if kind == STICK:
-                out = -1.0 * out
-            else:
-                for b in range(3):
-                    out[axis, b] = -out[axis, b]
+        if kind != PERIODIC and kind != STICK:
+            out[axis] = -out[axis]
     return out
 
 

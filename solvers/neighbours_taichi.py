@@ -74,16 +74,13 @@ def image_gradient(box, g, code):
 
 
 @ti.func
-def image_rate(box, rate, code):
-    """A velocity gradient seen in the walls: S_v L S_x, with the signs of the velocity and of the place."""
-    out = rate
+def image_traction(box, g, code):
+    """What pulls matter back to its neighbours' linear flow, seen in the walls."""
+    out = g
     for axis in ti.static(range(3)):
         kind = face_kind(box, code, axis)
-        if kind != PERIODIC:
-            for a, b in ti.static(ti.ndrange(3, 3)):
-                turned = kind == STICK or a == axis
-                if turned != (b == axis):
-                    out[a, b] = -out[a, b]
+        if kind != PERIODIC and kind != STICK:
+            out[axis] = -out[axis]
     return out
 
 

@@ -142,7 +142,10 @@ def _side_by_side(p: Pass) -> Callable:
                 r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
                 r[0] = wp.where(j == first + lane, FAR, r[0])
                 add = pair(num, own, other, r)
-                for c in range(wp.static(F)):
+                for q in range(wp.static(F // 4)):
+                    for c in range(4):
+                        totals[4 * q + c, lane] += add[4 * q + c]
+                for c in range(wp.static(F - F % 4), wp.static(F)):
                     totals[c, lane] += add[c]
         for k in range(lists.inside[group], lists.number[group]):
             entry = lists.entries[start + k]
@@ -161,7 +164,10 @@ def _side_by_side(p: Pass) -> Callable:
                         own[4 * q + c] = owns[4 * q + c, lane]
                 r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
                 add = held(rough, pair(num, own, other, r))
-                for c in range(wp.static(F)):
+                for q in range(wp.static(F // 4)):
+                    for c in range(4):
+                        totals[4 * q + c, lane] += add[4 * q + c]
+                for c in range(wp.static(F - F % 4), wp.static(F)):
                     totals[c, lane] += add[c]
         for lane in range(wp.static(LANES)):
             if first + lane - world * capacity < count[world]:

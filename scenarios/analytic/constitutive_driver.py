@@ -19,7 +19,7 @@ def driven(gradient: tuple[float, ...], time: float, dt: float, yield_stress: fl
     history = []
     for _ in range(round(time / dt)):
         arguments: Any = (*gradient, *b, MODULUS, yield_stress, k, n, relax, dt)
-        b = law.strain_and_flow(*arguments)
+        b = law.strain_and_flow(*arguments)[:6]
         history.append(b)
     return np.array(history)
 

@@ -205,7 +205,7 @@ def passes(alone: bool) -> SimpleNamespace:
                     j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
                     b, s = elastic_normal[p], elastic_shear[p]
                     if phase.shear_modulus > 0.0:
-                        b, s = strained(phase, phase.shear_modulus, c, b, s, h)
+                        b, s, _ = strained(phase, phase.shear_modulus, c, b, s, h)
                         elastic_normal[p], elastic_shear[p] = b, s
                     volume_ratio[p] = j
                     tau = kirchhoff(phase, j, b, s, c)

@@ -129,7 +129,7 @@ def stressed(
         j *= wp.max(1.0 + dt * wp.trace(c), 0.1)
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
-            b, s = strained(phase, phase.shear_modulus, c, b, s, dt)
+            b, s, _kept = strained(phase, phase.shear_modulus, c, b, s, dt)
             elastic_normal[p] = b
             elastic_shear[p] = s
         a -= columns_scaled(kirchhoff(phase, j, b, s, c), (4.0 * dt * volume[p]) * wp.cw_mul(grid.inv_dx, grid.inv_dx))

@@ -291,7 +291,7 @@ def strain(
                 modulus = conveyed_modulus(phase.shear_modulus, num.stiffness, rest, num.spacing, dt[world])
                 b, s = elastic_normal[i], elastic_shear[i]
                 if held[i] != CARRIED:
-                    b, s = strained(phase, modulus, stressed(sums, 0) @ correction, b, s, dt[world])
+                    b, s, _ = strained(phase, modulus, stressed(sums, 0) @ correction, b, s, dt[world])
                     elastic_normal[i], elastic_shear[i] = b, s
                 carried = elastic_stress(modulus, b, s, 0.0) @ correction
             row = ti.Vector.zero(ti.f32, PULLING)

@@ -308,7 +308,7 @@ def strain_finish(num: Numbers, box: Box, data: Shearing, world: int, i: int, ow
         b = data.elastic_normal[i]
         s = data.elastic_shear[i]
         if data.held[i] != CARRIED:
-            b, s = strained(phase, modulus, slope, b, s, h)
+            b, s, _kept = strained(phase, modulus, slope, b, s, h)
             data.elastic_normal[i] = b
             data.elastic_shear[i] = s
         stress = elastic_stress(modulus, b, s, 0.0) * correction

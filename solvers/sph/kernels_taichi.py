@@ -9,10 +9,11 @@ from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC
 
 from ..aging import DISORDER
-from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
+from ..corrected import SOUND
+from ..corrected_taichi import elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
 from ..flow_taichi import pressure, strained
 from ..images import WALL_INSET
-from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_rate, image_velocity
+from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_traction, image_velocity
 from ..pairs_taichi import (
     matrix_into,
     over_pairs,
@@ -28,7 +29,6 @@ from ..taichi_bridge import (
     Floats,
     Forces,
     Ints,
-    Matrices,
     Phases,
     Quads,
     Vectors,
@@ -45,7 +45,8 @@ from ..taichi_bridge import (
     vec3,
     vec4,
 )
-from .kernels_warp import CRUSHED, FLOOR, MATTER, STATE, WHOLE, Smoothing
+from .kernels_warp import CRUSHED, FLOOR, MATTER, STATE
+from .particle import FARTHEST, WHOLE, Smoothing
 
 kernel = taichi_func(wendland)
 slope = taichi_func(wendland_slope)
@@ -88,6 +89,7 @@ def move(
     volume: Floats,
     acceleration: Vectors,
     new_density: Floats,
+    shift: Vectors,
     position: Vectors,
     velocity: Vectors,
     density: Floats,
@@ -106,6 +108,8 @@ def move(
                 carried = 0.5 * rest * rest / phase.bulk_modulus * weight
             carried_gradient[i] = carried
             free = position[i] + h * v
+            if held[i] == FREE:
+                free += shift[i]
             if too_fast(v, box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x = contained(box, free, WALL_INSET * spacing)
@@ -136,6 +140,24 @@ def rubbed(box, x, v, inward_pull, walls, h):
 
 
 @ti.func
+def drifted(num, phase, rho, rest, second, first_moment):
+    """What is summed beyond what is integrated, where the neighbourhood is whole or too crowded: see particle.py."""
+    drift = second * num.lattice / 3.0 - rho
+    whole = 1.0
+    if drift <= 0.0:
+        whole = ti.max(1.0 - first_moment.norm() * num.h / (WHOLE * rho), 0.0)
+    grown = rest < 0.99 * phase.density
+    tolerance = num.density_tolerance
+    if grown:
+        tolerance = ti.max(tolerance, DISORDER)
+    gap = ti.max(ti.abs(drift) - tolerance * rho, 0.0)
+    drift = gap if drift > 0.0 else -gap
+    if phase.relaxation_rate > 0.0 or grown:
+        drift = ti.max(drift, ti.min(rest - rho, 0.0))
+    return whole * drift
+
+
+@ti.func
 def matter_seen(box, extra: ti.template(), row, j, code):
     """A row of `strain` in the walls."""
     moved = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
@@ -147,7 +169,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
     """All passes, for materials with or without shear stiffness, viscosity, and parameters or rest densities that
     differ between particles."""
     width = STATE[strength, changing]
-    last, many = width - 4, 19 if strength else 6
+    last, many = width - 4, 25 if strength else 10
     state_at, write_state = reader(width), writer(width)
 
     @ti.func
@@ -160,13 +182,17 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         sums = ti.Vector.zero(ti.f32, many)
         sums[0] = w * (own[7] - partner - (vector_at(own, 8) + partner_gradient).dot(r))
         sums = vector_into(sums, 1, w * r)
+        near = (kernel(r.norm() / num.h, num.h) / num.near) ** 4
+        sums = vector_into(sums, 4, ti.max(near - 1.0, 0.0) * w * r)
         if ti.static(strength):
-            sums = matrix_into(sums, 4, -w * u.outer_product(r))
+            sums = matrix_into(sums, 7, -w * u.outer_product(r))
             square = -w * r.outer_product(r)
-            sums = vector_into(sums, 13, vec3(square[0, 0], square[1, 1], square[2, 2]))
-            sums = vector_into(sums, 16, vec3(square[0, 1], square[0, 2], square[1, 2]))
+            sums = vector_into(sums, 16, vec3(square[0, 0], square[1, 1], square[2, 2]))
+            sums = vector_into(sums, 19, vec3(square[0, 1], square[0, 2], square[1, 2]))
+            sums = vector_into(sums, 22, w * u)
         else:
-            sums[4], sums[5] = -w * r.norm_sqr(), w * u.dot(r)
+            ur, r2 = u.dot(r), r.norm_sqr()
+            sums[7], sums[8], sums[9] = -w * r2, w * ur, -w * ur * ur / (r2 + 0.01 * num.h * num.h)
         return sums
 
     strained_by = over_pairs(MATTER, many, strain_pair, matter_seen)
@@ -188,9 +214,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         held: Ints,
         elastic_normal: Vectors,
         elastic_shear: Vectors,
+        off_linear: Vectors,
         new_density: Floats,
         state: Quads,
-        rate: Matrices,
+        shift: Vectors,
         fault: Ints,
     ):
         for i in range(held.shape[0]):
@@ -204,35 +231,38 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     sound *= ti.sqrt(phase.density / rest)
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
-                second, approach = 0.0, 0.0
+                second, approach, sheared, flows, h = 0.0, 0.0, 0.0, True, dt[world]
                 gradient, correction = mat3(0.0), ti.Matrix.identity(ti.f32, 3)
+                b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
                 if ti.static(strength):
-                    moment = symmetric_at(sums, 13)
+                    moment = symmetric_at(sums, 16)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
-                    gradient = stressed(sums, 4) @ correction / rho
-                    rate[i] = gradient
+                    gradient = stressed(sums, 7) @ correction / rho
                     approach = -rho * gradient.trace()
+                    b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
+                    off = (vector_at(sums, 22) - gradient @ first_moment) / rho
+                    if least_eigenvalue(moment / rho) < SOUND:
+                        off, z = vec3(0.0), vec3(0.0)
+                    if held[i] != CARRIED:
+                        kept = 1.0
+                        b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h)
+                        flows = kept < 1.0 or phase.shear_modulus <= 0.0
+                        z = kept * (z + h * (0.5 * (gradient - gradient.transpose()) @ z + off))
+                        elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
+                    d = 0.5 * (gradient + gradient.transpose())
+                    sheared = ti.sqrt(ti.max(2.0 * (d.norm_sqr() - d.trace() ** 2 / 3.0), 0.0))
                 else:
-                    second, approach = sums[4], sums[5]
-                # What is summed against what is integrated, where the neighbourhood is whole or too crowded.
-                drift = second * num.lattice / 3.0 - rho
-                whole = 1.0
-                if drift <= 0.0:
-                    whole = ti.max(1.0 - first_moment.norm() * num.h / (WHOLE * rho), 0.0)
-                grown = rest < 0.99 * phase.density
-                tolerance = num.density_tolerance
-                if grown:
-                    tolerance = ti.max(tolerance, DISORDER)
-                gap = ti.max(ti.abs(drift) - tolerance * rho, 0.0)
-                drift = gap if drift > 0.0 else -gap
-                if phase.relaxation_rate > 0.0 or grown:
-                    drift = ti.max(drift, ti.min(rest - rho, 0.0))
-                if is_solid(phase):
-                    drift, spread = 0.0, 0.0
-                h = dt[world]
-                growth = approach + num.density_feedback * sound / num.h * whole * drift
-                growth += 2.0 * num.density_diffusion * num.h * sound * spread / rho
+                    second, approach = sums[7], sums[8]
+                    sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
+                growth, out = approach, vec3(0.0)
+                if flows and not is_solid(phase):
+                    out = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * vector_at(sums, 4) / rho
+                    growth += (
+                        num.density_feedback * sound / num.h * drifted(num, phase, rho, rest, second, first_moment)
+                    )
+                    growth += 2.0 * num.density_diffusion * num.h * sound * spread / rho
+                shift[i] = out
                 rho += h * growth
                 if rho <= -rest or beyond(rho, CRUSHED * rest):
                     ti.atomic_or(fault[0], FAULT_STATE)
@@ -246,15 +276,12 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 for c in ti.static(range(7)):
                     row[c] = own[c]
                 if ti.static(strength):
-                    b, s = elastic_normal[i], elastic_shear[i]
-                    if held[i] != CARRIED:
-                        b, s = strained(phase, phase.shear_modulus, gradient, b, s, h)
-                        elastic_normal[i], elastic_shear[i] = b, s
+                    damping = 0.1 * num.artificial_viscosity * num.h * sound * rho
+                    pull = num.compact * (num.hourglass * phase.shear_modulus * z + damping * off)
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
+                    cauchy -= pull.outer_product(first_moment / own[7])
                     row = matrix_into(row, 7, scale * (cauchy @ correction))
-                    d = 0.5 * (gradient + gradient.transpose())
-                    row = vector_into(row, 16, vec3(d[0, 0], d[1, 1], d[2, 2]))
-                    row = vector_into(row, 19, vec3(d[0, 1], d[0, 2], d[1, 2]))
+                    row = vector_into(row, 16, scale * pull)
                 else:
                     row[7] = scale * p
                 if ti.static(changing):
@@ -263,14 +290,11 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 write_state(state, i, row)
 
     @ti.func
-    def state_seen(box, rate: ti.template(), row, j, code):
+    def state_seen(box, extra: ti.template(), row, j, code):
         out = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
         if ti.static(strength):
             out = matrix_into(out, 7, mirrored_stress(box, stressed(row, 7), code))
-            flow = image_rate(box, rate[j], code)
-            d = 0.5 * (flow + flow.transpose())
-            out = vector_into(out, 16, vec3(d[0, 0], d[1, 1], d[2, 2]))
-            out = vector_into(out, 19, vec3(d[0, 1], d[0, 2], d[1, 2]))
+            out = vector_into(out, 16, image_traction(box, vector_at(row, 16), code))
         return out
 
     @ti.func
@@ -288,14 +312,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         along = 0.0  # what acts along the line of centres
         push = vec3(0.0)
         if ti.static(strength):
-            flow = symmetric_at(own, 16) + symmetric_at(other, 16)
-            along = shock * (ur - 0.5 * r.dot(flow @ r)) / (r2 + tiny)
-            both = stressed(own, 7) + stressed(other, 7)
+            push = (stressed(own, 7) + stressed(other, 7)) @ r + vector_at(other, 16) - vector_at(own, 16)
             if ti.static(changing):
-                both /= own[last] * other[last]
-            push = both @ r
-            tension = ti.max(both.trace() / 3.0, 0.0)
-            along -= num.artificial_stress * tension * (kernel(q, num.h) / num.peak) ** 4
+                push /= own[last] * other[last]
         else:
             pressures = own[7] + other[7]
             if ti.static(changing):
@@ -323,7 +342,6 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         phase_of: Ints,
         forces: Forces,
         density: Floats,
-        rate: Matrices,
         acceleration: Vectors,
     ):
         for i in range(phase_of.shape[0]):
@@ -335,7 +353,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 shock = num.artificial_viscosity * num.h * phase.wave_speed / density[i]
                 drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
                 begun = vec4(shock, drag, 0.0, 0.0)
-                sums = pushed_by(num, box, lists, entries, number, state, rate, i, own, begun)
+                sums = pushed_by(num, box, lists, entries, number, state, density, i, own, begun)
                 a = vector_at(sums, 0) + force_at(forces, world, vector_at(own, 0))
                 rub = rubbed(box, vector_at(own, 0), vector_at(own, 4), a, vector_at(sums, 3), dt[world])
                 acceleration[i] = a + rub

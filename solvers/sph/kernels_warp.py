@@ -16,13 +16,14 @@ from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC, Box, Force, Phase, force_at, is_solid, too_fast
 from fluidbench.native.vector_access import store_vec4
 
-from ..aging import DISORDER, rest_density
+from ..aging import rest_density
 from ..bind import warp_func
-from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
+from ..corrected import SOUND, elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
 from ..flow import pressure, strained
-from ..images import WALL_INSET, contained, image_gradient, image_rate, image_velocity
+from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
+from .particle import Smoothing, drifted, off_linear, out_of_crowd, pulled_back, shear_rate
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -31,29 +32,12 @@ slope = warp_func(wendland_slope)
 
 FLOOR = wp.constant(0.1)  # least density over that at rest
 CRUSHED = wp.constant(1.0e3)  # density over that at rest that no matter reaches
-WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
 
 # Rows of `strain`: position, mass | velocity, density | carried gradient, rest density.
 MATTER = 12
 # Rows of `force`: position, mass | velocity, then of liquids the pressure term; of what has strength stress (9) and the
-# symmetric velocity gradient (xx yy zz xy xz yz). Where partners differ also density, rest density, viscosity, sound.
-STATE = {(False, False): 8, (True, False): 24, (False, True): 12, (True, True): 28}
-
-
-@wp.struct
-class Smoothing:
-    """Numbers of the discretisation."""
-
-    h: float  # smoothing length [m]
-    spacing: float  # [m]
-    peak: float  # kernel at one spacing [1/m^3]
-    viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
-    lattice: float  # makes the second moment of a lattice exactly its density [-]
-    density_diffusion: float  # delta [-]
-    artificial_viscosity: float  # alpha [-]
-    artificial_stress: float  # epsilon [-]
-    density_tolerance: float  # gap between the two that is left alone, over the density [-]
-    density_feedback: float  # rate at which the integrated density follows the summed one, in c / h [-]
+# traction that pulls back (3). Where partners differ also density, rest density, viscosity, sound.
+STATE = {(False, False): 8, (True, False): 20, (False, True): 12, (True, True): 24}
 
 
 @wp.struct
@@ -66,9 +50,10 @@ class Straining:
     held: wp.array(dtype=int)
     elastic_normal: wp.array(dtype=wp.vec3)
     elastic_shear: wp.array(dtype=wp.vec3)
+    off_linear: wp.array(dtype=wp.vec3)
     new_density: wp.array(dtype=float)
     state: wp.array(dtype=wp.vec4)  # rows of `force`
-    rate: wp.array(dtype=wp.mat33)
+    shift: wp.array(dtype=wp.vec3)
     fault: wp.array(dtype=int)
 
 
@@ -81,7 +66,6 @@ class Forcing:
     phase_of: wp.array(dtype=int)
     forces: wp.array(dtype=Force)
     new_density: wp.array(dtype=float)
-    rate: wp.array(dtype=wp.mat33)
     acceleration: wp.array(dtype=wp.vec3)
 
 
@@ -134,12 +118,13 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
     """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
-    `move`). Sums: diffusion, the first moment (3); then of liquids the second moment and the inflow, of what has
-    strength the velocity gradient (9) and the second moment (xx yy zz xy xz yz).
+    `move`). Sums: diffusion, the first moment (3), crowding (3); then of liquids the second moment, the
+    inflow and the rate of shear squared over 5, of what has strength the velocity gradient (9), the second moment
+    (xx yy zz xy xz yz) and the motion off the mean of the neighbours (3).
     """
-    sums_of = 19 if strength else 6
+    sums_of = 25 if strength else 10
     state_of = STATE[strength, changing] // 4
-    Own, Other, Sums, Strong = floats(MATTER + 4), floats(MATTER), floats(sums_of), floats(19)
+    Own, Other, Sums, Strong = floats(MATTER + 4), floats(MATTER), floats(sums_of), floats(25)
 
     @wp.func
     def pair(num: Smoothing, own: Own, other: Other, r: wp.vec3):
@@ -156,16 +141,22 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
             carried *= share
         spread = w * (own[7] - partner - wp.dot(wp.vec3(own[8], own[9], own[10]) + carried, r))
         m = w * r
+        near = kernel(wp.sqrt(r2) / num.h, num.h) / num.near
+        near *= near
+        crowd = wp.max(near * near - 1.0, 0.0) * m
         if wp.static(strength):
             return Strong(
-                spread, m[0], m[1], m[2],
+                spread, m[0], m[1], m[2], crowd[0], crowd[1], crowd[2],
                 -u[0] * m[0], -u[0] * m[1], -u[0] * m[2],
                 -u[1] * m[0], -u[1] * m[1], -u[1] * m[2],
                 -u[2] * m[0], -u[2] * m[1], -u[2] * m[2],
                 -m[0] * r[0], -m[1] * r[1], -m[2] * r[2], -m[0] * r[1], -m[0] * r[2], -m[1] * r[2],
+                w * u[0], w * u[1], w * u[2],
             )  # fmt: skip
         else:  # noqa: RET505 - Warp compiles one of the two
-            return Sums(spread, m[0], m[1], m[2], -w * r2, wp.dot(m, u))
+            ur = wp.dot(u, r)
+            sheared = -w * ur * ur / (r2 + 0.01 * num.h * num.h)
+            return Sums(spread, m[0], m[1], m[2], crowd[0], crowd[1], crowd[2], -w * r2, w * ur, sheared)
 
     @wp.func
     def finish(num: Smoothing, box: Box, data: Straining, world: int, i: int, own: Own, sums: Sums):
@@ -178,44 +169,50 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
             sound = phase.wave_speed * wp.sqrt(phase.density / rest)
         spread = sums[0]
         first_moment = wp.vec3(sums[1], sums[2], sums[3])
-        second, inflow = float(0.0), float(0.0)
+        crowd = wp.vec3(sums[4], sums[5], sums[6])
+        second, inflow, strain = float(0.0), float(0.0), float(0.0)
+        flows = bool(True)
         gradient, correction = wp.mat33(), wp.mat33()
         if wp.static(strength):
             # density from the corrected gradient, too: the same strain for pressure and for shear
             moment = wp.mat33(
-                sums[13], sums[16], sums[17], sums[16], sums[14], sums[18], sums[17], sums[18], sums[15]
+                sums[16], sums[19], sums[20], sums[19], sums[17], sums[21], sums[20], sums[21], sums[18]
             )  # fmt: skip
             second = wp.trace(moment)
             correction = symmetric_inverse(moment / rho)
             gradient = wp.mat33(
-                sums[4], sums[5], sums[6], sums[7], sums[8], sums[9], sums[10], sums[11], sums[12]
+                sums[7], sums[8], sums[9], sums[10], sums[11], sums[12], sums[13], sums[14], sums[15]
             )  # fmt: skip
             gradient = gradient * correction / rho
-            data.rate[i] = gradient
             inflow = -rho * wp.trace(gradient)
+            b = data.elastic_normal[i]
+            s = data.elastic_shear[i]
+            # the gradient of a straggler is not exact even in a linear flow
+            whole = float(least_eigenvalue(moment / rho) >= SOUND)
+            z = whole * data.off_linear[i]
+            q = (whole / rho) * (wp.vec3(sums[22], sums[23], sums[24]) - gradient * first_moment)
+            if data.held[i] != CARRIED:
+                b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h)
+                flows = kept < 1.0 or phase.shear_modulus <= 0.0
+                z = off_linear(z, gradient, q, kept, h)
+                data.elastic_normal[i] = b
+                data.elastic_shear[i] = s
+                data.off_linear[i] = z
+            strain = h * shear_rate(gradient)
         else:
-            second = sums[4]
-            inflow = sums[5]
-        # The density that particles really have, against the one they integrate, which drifts: applied where the
-        # neighbourhood is complete (it leans to no side), or too crowded for any.
-        drift = second * num.lattice / 3.0 - rho
-        whole = wp.max(1.0 - wp.length(first_moment) * num.h / (WHOLE * rho), 0.0)
-        if drift > 0.0:
-            whole = 1.0
-        tolerance = float(num.density_tolerance)
-        if rest < 0.99 * phase.density:
-            tolerance = wp.max(tolerance, DISORDER)
-        drift = wp.sign(drift) * wp.max(wp.abs(drift) - tolerance * rho, 0.0)
-        if phase.relaxation_rate > 0.0 or rest < 0.99 * phase.density:
-            # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and
-            # would be pulled closer
-            drift = wp.max(drift, wp.min(rest - rho, 0.0))
-        if is_solid(phase):
-            drift = 0.0  # density is its strain: nothing may level it
-            spread = 0.0
-        inflow += num.density_feedback * sound / num.h * whole * drift
-        growth = inflow + 2.0 * num.density_diffusion * num.h * sound * spread / rho
-        rho += h * growth
+            second = sums[7]
+            inflow = sums[8]
+            strain = h * wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
+        data.shift[i] = wp.vec3(0.0, 0.0, 0.0)
+        if flows and not is_solid(phase):
+            data.shift[i] = out_of_crowd(crowd / rho, num.h, num.shifting * strain)
+            drift = drifted(num, phase, rho, rest, second, first_moment)
+            inflow += (
+                sound
+                / num.h
+                * (num.density_feedback * drift + 2.0 * num.density_diffusion * num.h * num.h * spread / rho)
+            )
+        rho += h * inflow
         if not (rho > -rest and rho < CRUSHED * rest):
             raise_fault(data.fault, FAULT_STATE)
         rho = wp.max(rho, FLOOR * rest)
@@ -227,21 +224,18 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
         at = i * state_of
         store_vec4(data.state, at, wp.vec4(own[0], own[1], own[2], own[3]))
         if wp.static(strength):
-            b = data.elastic_normal[i]
-            s = data.elastic_shear[i]
-            if data.held[i] != CARRIED:
-                b, s = strained(phase, phase.shear_modulus, gradient, b, s, h)
-                data.elastic_normal[i] = b
-                data.elastic_shear[i] = s
             g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J
+            # Monaghan & Gingold 1983 act as a viscosity alpha h c / 10: here on what no gradient shows, a smooth flow
+            # feels none
+            damping = 0.1 * num.artificial_viscosity * num.h * sound * rho * num.compact
+            pull = pulled_back(phase, num.hourglass * num.compact, damping, z, q)
             # With the correction of its gradient stress does on the particles exactly the work of the strain.
-            t = scale * (elastic_stress(g, b, s, p) * correction)
-            d = 0.5 * (gradient + wp.transpose(gradient))
+            t = scale * ((elastic_stress(g, b, s, p) - wp.outer(pull, first_moment / own[7])) * correction)
+            pull *= scale
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], t[0, 0]))
             store_vec4(data.state, at + 2, wp.vec4(t[0, 1], t[0, 2], t[1, 0], t[1, 1]))
             store_vec4(data.state, at + 3, wp.vec4(t[1, 2], t[2, 0], t[2, 1], t[2, 2]))
-            store_vec4(data.state, at + 4, wp.vec4(d[0, 0], d[1, 1], d[2, 2], d[0, 1]))
-            store_vec4(data.state, at + 5, wp.vec4(d[0, 2], d[1, 2], 0.0, 0.0))
+            store_vec4(data.state, at + 4, wp.vec4(pull[0], pull[1], pull[2], 0.0))
         else:
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], scale * p))
         if wp.static(changing):
@@ -278,14 +272,9 @@ def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
             for a in range(3):
                 for b in range(3):
                     row[7 + 3 * a + b] = t[a, b]
-            # a stick wall turns the antisymmetric part into a symmetric one
-            g = image_rate(box, data.rate[j], code)
-            row[16] = g[0, 0]
-            row[17] = g[1, 1]
-            row[18] = g[2, 2]
-            row[19] = 0.5 * (g[0, 1] + g[1, 0])
-            row[20] = 0.5 * (g[0, 2] + g[2, 0])
-            row[21] = 0.5 * (g[1, 2] + g[2, 1])
+            g = image_traction(box, wp.vec3(row[16], row[17], row[18]), code)
+            for axis in range(3):
+                row[16 + axis] = g[axis]
         return row
 
     @wp.func
@@ -306,17 +295,6 @@ def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
         along = float(0.0)
         push = wp.vec3(0.0, 0.0, 0.0)
         if wp.static(strength):
-            # artificial viscosity on what the velocity gradients of both do not explain, such as rows that slip past
-            # each other: a smooth flow feels none (Frontiere, Raskin & Owen 2017)
-            stretch = (
-                (own[16] + other[16]) * r[0] * r[0]
-                + (own[17] + other[17]) * r[1] * r[1]
-                + (own[18] + other[18]) * r[2] * r[2]
-                + 2.0 * (own[19] + other[19]) * r[0] * r[1]
-                + 2.0 * (own[20] + other[20]) * r[0] * r[2]
-                + 2.0 * (own[21] + other[21]) * r[1] * r[2]
-            )
-            along = shock * (ur - 0.5 * stretch) / (r2 + tiny)
             both = wp.mat33(
                 own[7] + other[7], own[8] + other[8], own[9] + other[9],
                 own[10] + other[10], own[11] + other[11], own[12] + other[12],
@@ -325,10 +303,10 @@ def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
             if wp.static(changing):
                 # (sigma_i + sigma_j) / (rho_i rho_j): light matter must not feel its heavy partner's mass
                 both *= 1.0 / (own[LAST] * other[LAST])
-            push = both * r
-            # artificial stress against the tensile instability (Monaghan 2000; Gray et al. 2001)
-            ratio = kernel(q, num.h) / num.peak
-            along -= num.artificial_stress * wp.max(wp.trace(both) / 3.0, 0.0) * ratio * ratio * ratio * ratio
+            pull = wp.vec3(other[16] - own[16], other[17] - own[17], other[18] - own[18])
+            if wp.static(changing):
+                pull *= 1.0 / (own[LAST] * other[LAST])
+            push = both * r + pull
         else:
             both_pressures = own[7] + other[7]
             if wp.static(changing):
@@ -385,6 +363,7 @@ def move(
     volume: wp.array(dtype=float),
     acceleration: wp.array(dtype=wp.vec3),
     new_density: wp.array(dtype=float),
+    shift: wp.array(dtype=wp.vec3),
     # outputs
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -411,6 +390,8 @@ def move(
             carried = stiffness * (force_at(force[world], position[i]) - acceleration[i])
         carried_gradient[i] = carried
         free = position[i] + h * v
+        if held[i] == FREE:
+            free += shift[i]
         if too_fast(v, box.top_speed):
             raise_fault(fault, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * spacing)

@@ -11,7 +11,7 @@ from pydantic import Field
 from fluidbench.method.contract import Config, Economy
 from fluidbench.method.features import Feature
 from fluidbench.method.target import BACKENDS
-from fluidbench.method.timestep import Bound
+from fluidbench.method.timestep import Bound, damped_limit
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 from fluidbench.native.solver import Solver
@@ -27,6 +27,7 @@ from ..search import FAULT_NEIGHBOURS
 from ..smoothing import wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
 from . import kernels_warp as kernels
+from .particle import Smoothing
 
 NonNegative = Annotated[float, Field(ge=0)]
 Ratio = Annotated[float, Field(ge=1.0, le=3.0)]
@@ -34,7 +35,10 @@ Ratio = Annotated[float, Field(ge=1.0, le=3.0)]
 
 class ConfigSPH(Config):
     smoothing_ratio: Ratio = Field(1.8, description="smoothing length h over spacing, for liquids")
-    smoothing_ratio_solid: Ratio = Field(1.5, description="the same for materials with shear stiffness")
+    smoothing_ratio_solid: Ratio = Field(1.3, description="the same for materials with shear stiffness")
+    smoothing_ratio_foam: Ratio = Field(
+        1.5, description="the same for those that expand, whose particles lie in no order"
+    )
     cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
     viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
     force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
@@ -42,7 +46,10 @@ class ConfigSPH(Config):
     artificial_viscosity: NonNegative = Field(0.01, description="alpha for liquids")
     artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for solids and pastes")
     artificial_viscosity_viscoelastic: NonNegative = Field(0.3, description="alpha for liquids that relax")
-    artificial_stress: NonNegative = Field(0.2, description="epsilon against the tensile instability")
+    hourglass: NonNegative = Field(
+        2.0, description="zeta: stiffness, over the shear modulus, of motion that no velocity gradient shows"
+    )
+    shifting: NonNegative = Field(4.0, description="shift out of a crowd, over strain and h^2 times its gradient")
     density_feedback: NonNegative = Field(
         0.05, description="rate, in c / h, at which integrated density follows the summed one, except in solids"
     )
@@ -54,11 +61,20 @@ class ConfigSPH(Config):
             return self.artificial_viscosity_viscoelastic
         return self.artificial_viscosity_solid if material.elastic else self.artificial_viscosity
 
-    def smoothing(self, solid: bool) -> float:
-        return self.smoothing_ratio_solid if solid else self.smoothing_ratio
+    def smoothing_key(self, material: Material) -> str:
+        if not material.elastic:
+            return "smoothing_ratio"
+        return "smoothing_ratio_solid" if material.expansion is None else "smoothing_ratio_foam"
+
+    def smoothing(self, material: Material) -> float:
+        """Smoothing length over spacing."""
+        return float(getattr(self, self.smoothing_key(material)))
 
 
+STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
+CLOSE = 0.9  # distance below which particles are moved apart, in spacings
+HOURGLASS_SAFETY = 0.8  # for the stress and the pressure act on the same waves
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
 
 
@@ -73,7 +89,7 @@ class SolverSPH(Solver):
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigSPH
     passes = ("lists", "pack", "strain", "force", "move")
-    OWN: ClassVar = ("matter", "new_density", "state", "rate", "acceleration")
+    OWN: ClassVar = ("matter", "new_density", "state", "shift", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 4.0e5, 1400.0
@@ -82,22 +98,22 @@ class SolverSPH(Solver):
         "density_feedback": 0.0,
         "artificial_viscosity": 0.0,
         "artificial_viscosity_solid": 0.0,
-        "artificial_stress": 0.0,
+        "hourglass": 0.0,
+        "shifting": 0.0,
     }
 
     @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
-        solid = scenario.material.youngs_modulus is not None
-        key = "smoothing_ratio_solid" if solid else "smoothing_ratio"
+        key = config.smoothing_key(scenario.material)
         return [
-            Economy("fewer neighbours", {key: round(max(0.8 * config.smoothing(solid), 1.2), 3)}),
+            Economy("fewer neighbours", {key: round(max(0.8 * getattr(config, key), 1.2), 3)}),
             Economy("larger dt", {"cfl": 2.0 * config.cfl, "viscous_number": 0.11}),
             Economy("no density feedback", {"density_feedback": 0.0}),
         ]
 
     @classmethod
     def theory(cls, scenario: Scenario, config: Any) -> float:
-        ratio = config.smoothing(scenario.material.youngs_modulus is not None)
+        ratio = config.smoothing(scenario.material)
         return stable_dt(cls, scenario, config, *sph_numbers(ratio, config.cfl, config.viscous_number))
 
     @classmethod
@@ -116,12 +132,14 @@ class SolverSPH(Solver):
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
         c, m = scenario.wave_speed, scenario.material
-        solid = m.elastic
-        h = config.smoothing(solid) * scenario.spacing
+        ratio = config.smoothing(m)
+        h = ratio * scenario.spacing
         # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1).
         nu = m.viscosity / m.density + config.alpha(m) * h * c / 10.0
         g = scenario.peak_acceleration
         a = config
+        shear_speed = math.sqrt(m.shear_modulus / m.density)
+        hourglass = hourglass_limit(ratio, a.hourglass, shear_speed, a.alpha(m) * c) if m.elastic else math.inf
         return [
             Bound(
                 "acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; references.md, H: < 1.73"
@@ -131,6 +149,12 @@ class SolverSPH(Solver):
                 a.viscous_number * h * h / nu if nu > 0 else math.inf,
                 f"{a.viscous_number:g} h^2 / nu, artificial viscosity included",
                 "references.md, H: 0.111 h^2 / nu for the Monaghan-Gingold operator",
+            ),
+            Bound(
+                "hourglass",
+                HOURGLASS_SAFETY * scenario.spacing * hourglass,
+                f"{HOURGLASS_SAFETY:g} of the limit of waves that no gradient shows, zeta = {a.hourglass:g}",
+                "symplectic Euler on the shortest waves of a lattice",
             ),
             Bound(
                 "force",
@@ -144,30 +168,32 @@ class SolverSPH(Solver):
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
-        self.num = kernels.Smoothing()
-        self.num.h = config.smoothing(scene.elastic) * scene.spacing
+        self.num = Smoothing()
+        ratio = config.smoothing(scene.scenario.material)
+        self.num.h = ratio * scene.spacing
         self.num.spacing = scene.spacing
-        self.num.peak = wendland(scene.spacing / self.num.h, self.num.h)
-        second, fourth = lattice_moments(config.smoothing(scene.elastic))
+        self.num.near = wendland(CLOSE * scene.spacing / self.num.h, self.num.h)
+        second, fourth = lattice_moments(ratio)
         self.num.lattice, self.num.viscous_lattice = 1.0 / second, fourth**-0.5
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
-        self.num.artificial_stress = config.artificial_stress
+        self.num.compact = (scene.spacing / opposing(ratio)) ** 2
+        self.num.hourglass, self.num.shifting = config.hourglass, config.shifting
         self.num.density_feedback = config.density_feedback
         self.num.density_tolerance = config.density_tolerance
         pool.add_field("density", float, scene.scenario.material.density)
         pool.add_field("carried_gradient", wp.vec3)
         self._rest_densities()
-        solid = pool.size if scene.elastic else 1
         if scene.elastic:
             pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
             pool.add_field("elastic_shear", wp.vec3)
+            pool.add_field("off_linear", wp.vec3)
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
             self.matter = wp.zeros(pool.size * kernels.MATTER // 4, dtype=wp.vec4)
             self.state = wp.zeros(pool.size * kernels.STATE[scene.elastic, scene.changes] // 4, dtype=wp.vec4)
             self.new_density = wp.zeros(pool.size, dtype=float)
-            self.rate = wp.zeros(solid, dtype=wp.mat33)
+            self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
         self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
         self._bring_together()
@@ -188,11 +214,16 @@ class SolverSPH(Solver):
         self.straining, self.forcing = kernels.Straining(), kernels.Forcing()
         for data in (self.straining, self.forcing):
             data.dt, data.phases, data.phase_of = scene.dt, scene.phases, pool.phase
-            data.new_density, data.rate = self.new_density, self.rate
+            data.new_density = self.new_density
         self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
-        elastic = [pool.elastic_normal, pool.elastic_shear] if scene.elastic else [self.unused, self.unused]
-        self.straining.elastic_normal, self.straining.elastic_shear = elastic
+        self.straining.shift = self.shift
+        for name, array in zip(STRAINS, self._strains(), strict=True):
+            setattr(self.straining, name, array)
         self.forcing.forces, self.forcing.acceleration = scene.force, self.acceleration
+
+    def _strains(self) -> list[wp.array]:
+        """Fields of what has strength; stand-ins where nothing has."""
+        return [self.pool.fields[name] if self.scene.elastic else self.unused for name in STRAINS]
 
     def _rest_densities(self) -> None:
         """Every slot starts at its world's rest density."""
@@ -219,12 +250,11 @@ class SolverSPH(Solver):
 
     def harden(self, due: wp.array) -> None:
         pool, elastic = self.pool, self.scene.elastic
-        tensor = [pool.elastic_normal, pool.elastic_shear] if elastic else [self.unused, self.unused]
         self.scene.crew.launch(
             aging.harden_at_density,
             pool.size,
             [int(elastic), pool.capacity, pool.count, self.scene.phases, due, pool.mass, pool.density],
-            [pool.phase, pool.volume, *tensor],
+            [pool.phase, pool.volume, *self._strains()],
         )
 
     def lists(self) -> None:
@@ -278,6 +308,7 @@ class SolverSPH(Solver):
                 pool.volume,
                 self.acceleration,
                 self.new_density,
+                self.shift,
             ],
             [pool.position, pool.velocity, pool.density, pool.carried_gradient, pool.fault],
         )
@@ -312,11 +343,43 @@ class SolverSPH(Solver):
         return own | self.neighbours.footprint()
 
 
+def lattice(ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n, 3) of a unit lattice about a particle and -W'/r there (n,), with h = ratio."""
+    axis = np.arange(-int(2 * ratio) - 1, int(2 * ratio) + 2)
+    places = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3).astype(float)
+    slopes = [-wendland_slope(float(np.linalg.norm(place)) / ratio, ratio) for place in places]
+    return places, np.array(slopes)
+
+
 def lattice_moments(ratio: float) -> tuple[float, float]:
     """Sums over a unit lattice with h = ratio, each 1 in the continuum: the second moment -sum V r^2 W' / (3 r), which
     scales summed density, and the fourth -5 sum V x^2 z^2 W' / r^3, which scales viscosity in shear."""
-    axis = np.arange(-int(2 * ratio) - 1, int(2 * ratio) + 2)
-    x, y, z = (g.ravel() for g in np.meshgrid(axis, axis, axis))
-    r2 = x * x + y * y + z * z
-    slope = np.array([wendland_slope(math.sqrt(value) / ratio, ratio) for value in r2])
-    return float(-(slope * r2).sum() / 3.0), float(-5.0 * (slope * x * x * z * z / np.maximum(r2, 1)).sum())
+    places, slopes = lattice(ratio)
+    r2 = (places**2).sum(axis=1)
+    fourth = slopes * places[:, 0] ** 2 * places[:, 2] ** 2 / np.maximum(r2, 1.0)
+    return float((slopes * r2).sum() / 3.0), float(5.0 * fourth.sum())
+
+
+def opposing(ratio: float, axes: int = 1) -> float:
+    """Sum of -V W' / r over the partners in a unit lattice that move against a particle in the shortest wave along one
+    axis, or along the diagonal of several.
+
+    A velocity v in that wave has q = 2 v opposing; with l = 1 / opposing (in spacings) g does the work that the stress
+    between neighbours would do, G (2 v / d)^2 / 2 a volume, at zeta = 1, and at zeta = pi^2 / 4 the shortest wave is as
+    fast as all others.
+    """
+    places, slopes = lattice(ratio)
+    return float(slopes[places[:, :axes].sum(axis=1) % 2 == 1].sum())
+
+
+def hourglass_limit(ratio: float, zeta: float, shear_speed: float, alpha_c: float) -> float:
+    """Largest stable dt over the spacing [s/m] of waves that no gradient shows, along axes and diagonals.
+
+    They have omega = 2 sqrt(zeta) c_s f / d and are damped at 4 f^2 nu / d^2, with nu = alpha h c / 10 and f being
+    `opposing` over that along an axis.
+    """
+    f = max(opposing(ratio, axes) for axes in (1, 2, 3)) / opposing(ratio)
+    wave = math.sqrt(zeta) * shear_speed * f
+    damping = 4.0 * f * f * alpha_c * ratio / 10.0
+    viscous = 2.0 / damping if damping > 0 else math.inf
+    return damped_limit(1.0 / wave, viscous) if wave > 0 else viscous

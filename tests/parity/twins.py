@@ -32,8 +32,8 @@ ROWS = {
 STATES = {
     8: [*PLACE, VELOCITY, (7, 8)],
     12: [*PLACE, VELOCITY, *((k, k + 1) for k in range(7, 12))],
-    24: [*PLACE, VELOCITY, (7, 16), (16, 22)],
-    28: [*PLACE, VELOCITY, (7, 16), (16, 22), *((k, k + 1) for k in range(24, 28))],
+    20: [*PLACE, VELOCITY, (7, 16), (16, 19)],
+    24: [*PLACE, VELOCITY, (7, 16), (16, 19), *((k, k + 1) for k in range(20, 24))],
 }
 
 
@@ -87,9 +87,12 @@ class Twins:
         self.equalise()
 
     def _least_scales(self) -> dict[str, float]:
-        """Of what is made of numbers that cancel: PBD's multipliers of densities of order 1, those of its bonds of
-        lengths of a spacing, its stress of elastic tensors of order 1."""
+        """Of what is made of numbers that cancel: SPH's shifts of crowding of order 1 / h, PBD's multipliers of
+        densities of order 1, those of its bonds of lengths of a spacing, its stress of elastic tensors of order 1."""
         sim = self.warp
+        if self.method == "sph":
+            speed, dt = float(np.abs(sim.pool.velocity.numpy()).max()), float(sim.scene.dt.numpy()[0])
+            return {"shift": sim.config.shifting * dt * speed / sim.scene.spacing * sim.solver.num.h}
         if self.method != "pbd":
             return {}
         masses = sim.pool.mass.numpy()

@@ -75,13 +75,15 @@ def test_pressure_and_present_volume_carry_over_where_j_is_integrated(ratio):
 def test_pressure_carries_over_where_density_is_integrated(density):
     """K (rho / rho0 - 1) stays, with K fourfold and rho as it is: rho0 = m / V changes."""
     two = Two(density=density)
+    off = wp.array([[1.0, 2.0, -3.0]] * 3, dtype=wp.vec3)
     launch(
         aging.harden_at_density,
         3,
         [1, 3, two.count, two.phases, two.due, two.mass, two.density],
-        [two.phase, two.volume, two.normal, two.shear],
+        [two.phase, two.volume, two.normal, two.shear, off],
     )
     two.check()
+    assert np.ptp(two.shear.numpy()[0] / two.shear.numpy()[1] - off.numpy()[0] / off.numpy()[1]) < 1e-5
     rest = 1e-3 / two.volume.numpy().astype(float)
     assert 4 * K * (density / rest[0] - 1) == pytest.approx(K * (density / 1000.0 - 1), rel=1e-3)
     assert rest[1:] == pytest.approx([1000.0] * 2) and two.density.numpy() == pytest.approx([density] * 3)

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from fluidbench.method.timestep import Bound, damped_limit, lost_speed, plan
 from fluidbench.registry import get_method
+from solvers.sph.solver import hourglass_limit
 
 from ..conftest import scenario
 
@@ -49,19 +50,23 @@ def test_mpm_follows_its_settings():
     [
         ({}, 1.8, 0.01),
         ({"viscosity": 2.0}, 1.8, 0.01),
-        ({"youngs_modulus": 1e4}, 1.5, 1.0),
-        ({"youngs_modulus": 1e4, "relaxation_time": 0.1}, 1.5, 0.3),
-        ({"cure": {"delay": 1.0, "youngs_modulus": 1e4}}, 1.5, 1.0),
+        ({"youngs_modulus": 1e4}, 1.3, 1.0),
+        ({"youngs_modulus": 1e4, "relaxation_time": 0.1}, 1.3, 0.3),
+        ({"cure": {"delay": 1.0, "youngs_modulus": 1e4}}, 1.3, 1.0),
     ],
 )
 def test_sph_by_hand(material, ratio, alpha):
-    """Monaghan's alpha acts as nu = alpha h c / 10; h is 1.8 d in liquids and 1.5 d in what is or becomes solid."""
+    """Monaghan's alpha acts as nu = alpha h c / 10; h is 1.8 d in liquids and 1.3 d in what is or becomes solid."""
     h = ratio * D
     shear = material.get("youngs_modulus", 0.0) / 2.6
     c = math.sqrt(C**2 + 4 * shear / 3000.0)
     nu = material.get("viscosity", 0.0) / 1000.0 + alpha * h * c / 10.0
     got = bounds("sph", material=material, gravity=[0, 0, -4.0])
     expected = {"acoustic": 0.4 * h / (c + V), "viscous": 0.09 * h**2 / nu, "force": 0.25 * math.sqrt(h / 4.0)}
+    if ratio == 1.3:  # it has shear stiffness, or will
+        expected["hourglass"] = 0.8 * D * hourglass_limit(1.3, 2.0, math.sqrt(shear / 1000.0), alpha * c)
+    else:
+        expected["hourglass"] = math.inf
     assert got == pytest.approx(expected)
 
 
@@ -75,6 +80,7 @@ def test_sph_follows_its_settings_and_leaves_out_what_is_not_there():
     }
     got = bounds("sph", numerics=settings, gravity=[0, 0, -4.0])
     expected = {"acoustic": 0.2 * 0.02 / 15.0, "viscous": 0.05 * 4e-4 / 4.8e-4, "force": 0.5 * math.sqrt(0.02 / 4.0)}
+    expected["hourglass"] = math.inf
     assert got == pytest.approx(expected)
     still = bounds("sph", numerics={"artificial_viscosity": 0.0}, gravity=[0, 0, 0])
     assert still["viscous"] == still["force"] == math.inf

@@ -16,7 +16,7 @@ from solvers.images import (
     image_code,
     image_gradient,
     image_position,
-    image_rate,
+    image_traction,
     image_velocity,
     near_faces,
     opposite,
@@ -63,8 +63,8 @@ def look(
     vectors[i, 0] = image_position(b, x, c)
     vectors[i, 1] = image_velocity(b, v, c)
     vectors[i, 2] = image_gradient(b, v, c)
-    matrices[i, 0] = image_rate(b, g, c)
-    matrices[i, 1] = mirrored_stress(b, g, c)
+    vectors[i, 3] = image_traction(b, v, c)
+    matrices[i, 0] = mirrored_stress(b, g, c)
     for axis in range(3):
         numbers[i, axis] = image_code(c, axis)
         numbers[i, 3 + axis] = face_kind(b, c, axis)
@@ -94,7 +94,7 @@ X, GRADIENT = np.array([0.25, 0.5, 3.0]), np.arange(1.0, 10.0).reshape(3, 3)
 def seen(b, *codes, near=(7, 7, 7)):
     """(vectors, matrices, numbers) of each code, see `look`."""
     n = len(codes)
-    out = [wp.zeros((n, 3), dtype=wp.vec3), wp.zeros((n, 2), dtype=wp.mat33), wp.zeros((n, 9), dtype=int)]
+    out = [wp.zeros((n, 4), dtype=wp.vec3), wp.zeros((n, 1), dtype=wp.mat33), wp.zeros((n, 9), dtype=int)]
     wp.launch(
         look,
         n,
@@ -116,11 +116,12 @@ def inverted(*matrices, r=(0.0, 0.0, 0.0), b=None):
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("kind", [SLIP, STICK, FRICTION, PERIODIC])
 def test_images_in_each_face(axis, kind):
-    """dv_i / dx_j changes with the sign of v_i and of x_j; a stress with those of what slips."""
+    """A stress changes sign with what slips, a pull against crooked motion with its normal component, but at no-slip
+    walls."""
     b = box(*[kind if a == axis else SLIP for a in range(3)])
     for choice, mirror, shift in ((1, 2 * LOW - X, LOW - HIGH), (2, 2 * HIGH - X, HIGH - LOW)):
         choices = [choice if a == axis else 0 for a in range(3)]
-        (x, v, g), (rate, stress), numbers = (rows[0] for rows in seen(b, code_of(*choices)))
+        (x, v, g, pull), (stress,), numbers = (rows[0] for rows in seen(b, code_of(*choices)))
         expected = X.copy()
         expected[axis] = X[axis] + shift[axis] if kind == PERIODIC else mirror[axis]
         assert x == pytest.approx(expected)
@@ -132,18 +133,18 @@ def test_images_in_each_face(axis, kind):
         turned = {SLIP: one, FRICTION: one, STICK: -np.ones(3), PERIODIC: np.ones(3)}[kind]
         normal = np.ones(3) if kind == PERIODIC else one
         assert v.tolist() == (turned * V).tolist() and g.tolist() == (normal * V).tolist()
-        assert rate == pytest.approx(np.outer(turned, normal) * GRADIENT)
+        assert pull.tolist() == ((one if kind in (SLIP, FRICTION) else np.ones(3)) * V).tolist()
         signs = one if kind in (SLIP, FRICTION) else np.ones(3)
         assert stress == pytest.approx(np.outer(signs, signs) * GRADIENT)
 
 
 def test_images_in_corners_combine():
-    (x, v, g), (rate, stress), numbers = (rows[0] for rows in seen(box(SLIP, STICK, PERIODIC), code_of(1, 2, 1)))
+    (x, v, g, pull), (stress,), numbers = (rows[0] for rows in seen(box(SLIP, STICK, PERIODIC), code_of(1, 2, 1)))
     assert (
         x == pytest.approx([-0.25, 3.5, -2.0]) and v.tolist() == [1.0, -2.0, -4.0] and g.tolist() == [-1.0, -2.0, 4.0]
     )
     assert list(numbers) == [1, 2, 1, SLIP, STICK, PERIODIC, code_of(2, 1, 2), -1, 1]
-    assert rate == pytest.approx(np.outer([1, -1, -1], [-1, -1, 1]) * GRADIENT)
+    assert pull.tolist() == (np.array([-1, 1, 1]) * V).tolist()
     assert stress == pytest.approx(np.outer([-1, 1, 1], [-1, 1, 1]) * GRADIENT)
     _, _, numbers = (rows[0] for rows in seen(box(SLIP, PERIODIC, SLIP), code_of(1, 2, 2)))
     assert numbers[7] == code_of(1, 0, 2)

@@ -1,0 +1,93 @@
+"""What keeps SPH's particles in order: a pull against motion that no gradient shows, and shifting out of crowds.
+
+A velocity that alternates from particle to particle has no gradient at any of them, so no stress resists it (hourglass
+modes). What particle i moves off its neighbours' linear field is q_i = sum_j V_j (W'/r) (v_i - v_j) - L_i sum_j V_j
+(W'/r) r_ij [1/(m s)], zero in any linear flow; its integral z is a strain like the elastic tensor: it turns with the
+matter and is scaled back with the deviator. The traction g = l^2 (zeta G z + rho nu q) [Pa/m * m^2] pulls it back, with
+the transpose of q's own operator, so it does exactly the work of q: between partners (g_j - g_i) W'/r, and a share
+- g x sum_j V_j (W'/r) r_ij of the stress. Momentum and angular momentum stay. After the penalty of Zhang et al. (2024)
+with their linear prediction, but one memory a particle, and the transpose.
+"""
+
+import warp as wp
+
+from fluidbench.native.scene import Phase
+
+from ..aging import DISORDER
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
+FARTHEST = wp.constant(0.2)  # of h^2 crowd, in a step: beyond it partners would change places
+
+
+@wp.struct
+class Smoothing:
+    """Numbers of the discretisation."""
+
+    h: float  # smoothing length [m]
+    spacing: float  # [m]
+    near: float  # kernel at the distance below which partners crowd each other [1/m^3]
+    compact: float  # l^2: makes the shortest wave as stiff as between neighbours in a lattice [m^2]
+    viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
+    lattice: float  # makes the second moment of a lattice exactly its density [-]
+    density_diffusion: float  # delta [-]
+    artificial_viscosity: float  # alpha [-]
+    hourglass: float  # zeta [-]
+    shifting: float  # shift over strain and h^2 crowding [-]
+    density_tolerance: float  # gap between the two that is left alone, over the density [-]
+    density_feedback: float  # rate at which the integrated density follows the summed one, in c / h [-]
+
+
+@wp.func
+def off_linear(z: wp.vec3, gradient: wp.mat33, q: wp.vec3, kept: float, dt: float):
+    """z [1/m] after a step dt [s] in which the share `kept` of the deviator was kept."""
+    spin = 0.5 * (gradient - wp.transpose(gradient))
+    return kept * (z + dt * (spin * z + q))
+
+
+@wp.func
+def pulled_back(phase: Phase, stiffness: float, damping: float, z: wp.vec3, q: wp.vec3):
+    """g [Pa m]; `stiffness` is zeta l^2 [m^2], `damping` rho nu l^2 [Pa s m^2]."""
+    return stiffness * phase.shear_modulus * z + damping * q
+
+
+@wp.func
+def shear_rate(gradient: wp.mat33):
+    """sqrt(2 dev D : dev D) [1/s]."""
+    d = 0.5 * (gradient + wp.transpose(gradient))
+    mean = wp.trace(d) / 3.0
+    return wp.sqrt(wp.max(2.0 * (wp.ddot(d, d) - 3.0 * mean * mean), 0.0))
+
+
+@wp.func
+def out_of_crowd(crowd: wp.vec3, h: float, strain: float):
+    """How far a particle is shifted [m] while matter shears by `strain` times the constant: -strain h^2 crowd.
+
+    `crowd` [1/m] is sum_j V_j grad W (W^4 / W(r0)^4 - 1) over partners nearer than r0 = 0.9 d: the shifting of Lind et
+    al. (2012), by the tensile control of Monaghan (2000) alone. Partners push each other alike, so the centre of mass
+    stays; a lattice and its free surface feel nothing; what rests, flies or turns does not shear.
+    """
+    return -(wp.min(strain, FARTHEST) * h * h) * crowd
+
+
+@wp.func
+def drifted(num: Smoothing, phase: Phase, rho: float, rest: float, second: float, first_moment: wp.vec3):
+    """By how much the density that particles really have exceeds the one that they integrate, rho [kg/m^3].
+
+    Taken from the second moment where the neighbourhood is complete (it leans to no side), or too crowded for any; what
+    lies within the tolerance is left alone.
+    """
+    drift = second * num.lattice / 3.0 - rho
+    whole = wp.max(1.0 - wp.length(first_moment) * num.h / (WHOLE * rho), 0.0)
+    if drift > 0.0:
+        whole = 1.0
+    tolerance = float(num.density_tolerance)
+    if rest < 0.99 * phase.density:
+        tolerance = wp.max(tolerance, DISORDER)
+    drift = wp.sign(drift) * wp.max(wp.abs(drift) - tolerance * rho, 0.0)
+    if phase.relaxation_rate > 0.0 or rest < 0.99 * phase.density:
+        # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and would be
+        # pulled closer
+        drift = wp.max(drift, wp.min(rest - rho, 0.0))
+    return whole * drift

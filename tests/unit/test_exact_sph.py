@@ -1,0 +1,159 @@
+"""What keeps SPH's particles in order, by hand: the pull against motion that no gradient shows, and shifting."""
+
+import math
+
+import numpy as np
+import pytest
+import warp as wp
+
+from fluidbench.method.target import Target
+from fluidbench.native.scene import Phase
+from fluidbench.native.simulation import Simulation
+from fluidbench.registry import get_method
+from fluidbench.scenario.library import define
+from solvers.smoothing import wendland, wendland_slope
+from solvers.sph import particle
+from solvers.sph.solver import hourglass_limit, lattice_moments, opposing
+
+PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
+SIDE = 8
+
+
+def block(config=None, **material):
+    """A periodic cube of a lattice of 8 x 8 x 8 particles at rest, 1 m apart, and what runs it."""
+    material = {"density": 1000.0, "youngs_modulus": 1e5, "poisson_ratio": 0.3} | material
+    scenario = define(
+        "block",
+        domain={"lower": [0, 0, 0], "upper": [SIDE] * 3, "walls": PERIODIC},
+        bodies=[{"kind": "box", "center": [SIDE / 2] * 3, "size": [SIDE] * 3}],
+        material={key: value for key, value in material.items() if value is not None},
+        gravity=[0.0, 0.0, 0.0],
+        duration=1.0,
+        spacing=1.0,
+    )
+    method = get_method("sph")
+    return Simulation(scenario, "sph", Target(), method.Config(**(config or {})))
+
+
+def forces(simulation, velocity, substeps=1, dt=1e-3):
+    """Accelerations (n, 3) after substeps that begin at a velocity which is a function of the places."""
+    places = simulation.frame()["position"].astype(float)
+    simulation.kick(velocity(places))
+    simulation.march(dt, substeps)
+    return places, simulation.solver.acceleration.numpy()[: len(places)].astype(float)
+
+
+def zigzag(places, axes=1, along=1):
+    """1 mm/s, alternating from particle to particle."""
+    out = np.zeros_like(places)
+    out[:, along] = 1e-3 * (-1.0) ** np.floor(places[:, :axes]).sum(axis=1)
+    return out
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+@pytest.mark.parametrize("zeta", [0.0, 1.0, 2.5])
+def test_the_shortest_wave_pulls_back_with_the_frequency_that_its_stiffness_says(axes, zeta):
+    """omega^2 = 4 zeta (c_s f / d)^2 on what a step has displaced; without zeta nothing resists it."""
+    simulation = block({"artificial_viscosity_solid": 0.0, "hourglass": zeta, "smoothing_ratio_solid": 1.3})
+    dt = 1e-4
+    places, a = forces(simulation, lambda x: zigzag(x, axes), dt=dt)
+    shear = 1e5 / 2.6 / 1000.0  # c_s^2
+    f = opposing(1.3, axes) / opposing(1.3)
+    wanted = -4.0 * zeta * shear * f * f * dt * zigzag(places, axes)
+    assert a == pytest.approx(wanted, abs=1e-3 * 4.0 * 2.5 * shear * dt * 1e-3)
+
+
+def test_artificial_viscosity_damps_the_shortest_wave_and_no_smooth_flow():
+    """4 nu / d^2, nu = alpha h c / 10."""
+    simulation = block({"hourglass": 0.0, "artificial_viscosity_solid": 0.5, "smoothing_ratio_solid": 1.3})
+    places, a = forces(simulation, zigzag, dt=1e-6)
+    nu = 0.5 * 1.3 * simulation.scenario.wave_speed / 10.0
+    assert a == pytest.approx(-4.0 * nu * zigzag(places), rel=1e-2, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["translation", "rotation", "shear", "expansion"])
+def test_a_linear_flow_is_not_pulled_back_wherever_particles_lie(name):
+    rate = {
+        "translation": np.zeros((3, 3)),
+        "rotation": np.array([[0.0, -1.0, 0.5], [1.0, 0.0, -0.2], [-0.5, 0.2, 0.0]]),
+        "shear": np.array([[0.0, 1.0, 0.0], [0.0] * 3, [0.0] * 3]),
+        "expansion": np.eye(3),
+    }[name]
+    places = np.random.default_rng(1).uniform(-0.3, 0.3, (27, 3)) + np.stack(
+        np.meshgrid(*[np.arange(-1.0, 2.0)] * 3), axis=-1
+    ).reshape(-1, 3)
+    velocity = places @ rate.T + [3.0, -1.0, 2.0]
+    center = 13
+    r, u = places[center] - np.delete(places, center, 0), velocity[center] - np.delete(velocity, center, 0)
+    slope = np.array([wendland_slope(float(s) / 1.3, 1.3) for s in np.linalg.norm(r, axis=1)])
+    moment = -np.einsum("i,ia,ib->ab", slope, r, r)
+    gradient = -np.einsum("i,ia,ib->ab", slope, u, r) @ np.linalg.inv(moment)
+    assert gradient == pytest.approx(rate, abs=1e-9)
+    q = (slope[:, None] * u).sum(axis=0) - gradient @ (slope[:, None] * r).sum(axis=0)
+    assert q == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_is_off_the_linear_flow_turns_with_matter_and_yields_with_it():
+    spin = wp.mat33(0.0, -2.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    got = particle.off_linear(wp.vec3(1.0, 0.0, 4.0), spin, wp.vec3(0.0, 0.0, 10.0), 0.5, 0.1)
+    assert list(got) == pytest.approx([0.5, 0.1, 2.5])
+    phase = Phase()
+    phase.shear_modulus = 7.0
+    got = particle.pulled_back(phase, 2.0, 3.0, wp.vec3(1.0, 0.0, 0.0), wp.vec3(0.0, 1.0, 0.0))
+    assert list(got) == pytest.approx([14.0, 3.0, 0.0])
+
+
+def test_rate_of_shear():
+    assert particle.shear_rate(wp.mat33(0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) == pytest.approx(3.0)
+    assert particle.shear_rate(wp.mat33(0.0, 3.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0)) == pytest.approx(0.0, abs=1e-6)
+    assert particle.shear_rate(wp.mat33(2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0)) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_particles_leave_a_crowd_as_fast_as_matter_shears():
+    crowd = wp.vec3(2.0, 0.0, -1.0)
+    assert list(particle.out_of_crowd(crowd, 0.5, 0.01)) == pytest.approx([-0.005, 0.0, 0.0025])
+    assert list(particle.out_of_crowd(crowd, 0.5, 0.0)) == [0.0, 0.0, 0.0]
+    assert list(particle.out_of_crowd(crowd, 0.5, 1e9)) == pytest.approx([-0.1, 0.0, 0.05])  # no farther
+
+
+PASTE = {"yield_stress": 1e-6}
+LIQUID = {"youngs_modulus": None, "poisson_ratio": None, "sound_speed": 10.0}
+
+
+@pytest.mark.parametrize("material", [PASTE, LIQUID])
+@pytest.mark.parametrize("gap", [0.95, 0.8, 0.5])
+def test_only_near_partners_crowd_each_other(material, gap):
+    """Two that have come together in a lattice that shears at 1 1/s; 0.9 spacings is near enough to be left alone."""
+    config = {"shifting": 4.0, "smoothing_ratio_solid": 1.5, "smoothing_ratio": 1.5}
+    simulation = block(config, **material)
+    pool = simulation.pool
+    places = simulation.frame()["position"].astype(float)
+    first, second = (int(np.argmin(np.linalg.norm(places - p, axis=1))) for p in ([3.5, 3.5, 3.5], [4.5, 3.5, 3.5]))
+    moved = places.copy()
+    moved[second, 0] = moved[first, 0] + gap
+    pool.position.assign(np.pad(moved, ((0, pool.size - len(moved)), (0, 0))).astype(np.float32))
+    pool.stale = True
+    dt = 1e-4
+    simulation.kick(np.stack([0 * moved[:, 0], moved[:, 2] % SIDE, 0 * moved[:, 0]], axis=1))
+    simulation.march(dt, 1)
+    shift = simulation.solver.shift.numpy()[[first, second], 0].astype(float) / (4.0 * dt * 1.5**2)
+    if gap > 0.9:
+        assert not shift.any()
+    else:
+        assert shift[0] < 0.0 < shift[1]
+    if gap == 0.5:  # what else is near adds little
+        crowding = (wendland(0.5 / 1.5, 1.5) / wendland(0.9 / 1.5, 1.5)) ** 4 - 1.0
+        assert shift[1] - shift[0] == pytest.approx(-2.0 * wendland_slope(0.5 / 1.5, 1.5) * 0.5 * crowding, rel=0.35)
+
+
+def test_sums_over_a_lattice_by_hand():
+    """h = 1: neighbours at 1, sqrt 2, sqrt 3 (6, 12, 8 of them), slopes -105 / (16 pi) (1 - r / 2)^3."""
+    one, two, three = (105.0 / (16.0 * math.pi) * (1.0 - r / 2.0) ** 3 for r in (1.0, math.sqrt(2.0), math.sqrt(3.0)))
+    assert opposing(1.0) == pytest.approx(2 * one + 8 * two + 8 * three)
+    assert opposing(1.0, 2) == pytest.approx(4 * one + 8 * two)
+    assert opposing(1.0, 3) == pytest.approx(6 * one + 8 * three)
+    assert lattice_moments(1.0)[0] == pytest.approx((6 * one + 24 * two + 24 * three) / 3.0)
+    f = max(opposing(1.0, k) for k in (1, 2, 3)) / opposing(1.0)
+    assert hourglass_limit(1.0, 4.0, 3.0, 0.0) == pytest.approx(1.0 / (6.0 * f))
+    assert hourglass_limit(1.0, 0.0, 3.0, 5.0) == pytest.approx(2.0 / (4.0 * f * f * 0.5))
+    assert hourglass_limit(1.0, 0.0, 3.0, 0.0) == math.inf
