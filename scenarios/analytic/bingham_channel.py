@@ -74,8 +74,5 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=HALF / 16,
-    causes={
-        "sph": "slip at the wall, not understood: rows slide past their images, and finer spacings do not cure it",
-    },
     exempt={"pbd": "shear stiffness is limited by the time step"},
 )

@@ -49,6 +49,5 @@ CASE = Case(
     fine_tolerance=0.10,
     scenarios=scenarios,
     evaluate=evaluate,
-    causes={"sph": "columns that should stand sink by 2 to 4 % as their foot splits into petals, as in slump_slip"},
     exempt={"pbd": "shear stiffness is limited by the time step"},
 )

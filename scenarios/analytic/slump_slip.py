@@ -50,7 +50,6 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     exempt={
-        "pbd": "the thin foot splits into petals, like SPH's, and shear stiffness is limited by the time step",
-        "sph": "the thin foot splits into petals; suspected: hoop tension pulls particles out of reach",
+        "pbd": "the thin foot splits into petals, and shear stiffness is limited by the time step",
     },
 )

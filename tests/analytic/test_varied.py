@@ -1,21 +1,26 @@
-"""What the known answers hold fixed, varied: how long matter rests, grid ratios, sound speeds, the speed of a bead."""
+"""What the known answers hold fixed, varied: how long matter rests and flows, grid ratios, sound speeds, spacings."""
 
 import numpy as np
 import pytest
 
 from fluidbench.measure.ledger import final_lengths, lengths
+from fluidbench.measure.order import order
+from fluidbench.measure.profiles import relative_l2
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.runs.drive import Drive
 from fluidbench.scenario.library import define, load
 from fluidbench.scenario.numerics import configure
+from scenarios.analytic import bingham_channel
+from scenarios.analytic.slump_slip import HEIGHT
+from scenarios.analytic.slump_slip import column as slender
 
 
-def frames(scenario, ratio):
-    """Snapshots of a run of MPM at every output."""
-    config = configure(get_method("mpm"), scenario).model_copy(update={"grid_ratio": ratio})
-    sim, found = Simulation(scenario, "mpm", Target(), config), []
+def frames(scenario, method="mpm", **config):
+    """Snapshots of a run at every output."""
+    settings = configure(get_method(method), scenario).model_copy(update=config)
+    sim, found = Simulation(scenario, method, Target(), settings), []
     outcome = Drive(sim, scenario, lambda session, vital: found.append(session.frame())).run()
     assert outcome.verdict == "completed", outcome.reason
     return found
@@ -36,7 +41,7 @@ def test_a_ball_in_free_flight_keeps_shape_and_density(ratio, more):
         output_interval=0.3,
         spacing=0.05 / 6,
     )
-    first, last = frames(flight, ratio)
+    first, last = frames(flight, grid_ratio=ratio)
     before, after = (f["position"].astype(float) - f["position"].astype(float).mean(axis=0) for f in (first, last))
     assert np.abs(after - before).max() < 2e-3 * 0.05
     assert last["density"].mean() == pytest.approx(1000.0, rel=1e-3)
@@ -49,7 +54,7 @@ def test_a_slumped_column_rests(stress, answer):
         "column_slump",
         {"spacing": 0.1 / 24, "material.yield_stress": stress * 981.0, "duration": 6.0, "output_interval": 1.5},
     )
-    slump = np.array([lengths(frame, column)["slump"] for frame in frames(column, 1.5)])
+    slump = np.array([lengths(frame, column)["slump"] for frame in frames(column, grid_ratio=1.5)])
     assert slump[1] == pytest.approx(answer, abs=0.05)
     assert abs(slump[4] - slump[1]) < 0.015
     assert abs(slump[4] - slump[3]) / 1.5 < 1e-3  # less than 0.1 mm/s
@@ -58,5 +63,38 @@ def test_a_slumped_column_rests(stress, answer):
 @pytest.mark.parametrize("ratio", [1.5, 2.0])
 def test_a_bead_keeps_its_section_at_any_grid_ratio(ratio):
     bead = load("line_bead", {"spacing": 2e-3})
-    area = final_lengths(frames(bead, ratio)[-1], bead)["bead_area_m2"]
+    area = final_lengths(frames(bead, grid_ratio=ratio)[-1], bead)["bead_area_m2"]
     assert area == pytest.approx(np.pi / 4 * 0.012**2, rel=0.04)
+
+
+@pytest.mark.parametrize("stress", [0.2, 0.3])
+def test_a_column_of_sph_rests_in_order(stress):
+    """At three times its time nothing has moved by more than 0.5 % of H, and no two particles have come together."""
+    column = load(
+        "column_slump",
+        {"spacing": 0.1 / 16, "material.yield_stress": stress * 981.0, "duration": 4.5, "output_interval": 1.5},
+    )
+    found = frames(column, "sph")
+    slump = np.array([lengths(frame, column)["slump"] for frame in found])
+    assert abs(slump[3] - slump[1]) < 0.005 and abs(slump[3] - slump[2]) < 1e-3
+    assert order(found[-1], column)["least_distance"] > 0.6
+
+
+def test_a_column_of_sph_above_the_critical_stress_stands():
+    """It rings on, for nothing damps an elastic swing, but neither louder nor lower, and its lattice stays."""
+    column = slender("standing", 0.7, HEIGHT / 16, 4.0)
+    found = frames(column, "sph")
+    slump = np.array([lengths(frame, column)["slump"] for frame in found])
+    early, late = slump[3:16], slump[16:]
+    assert late.mean() - early.mean() < 0.005 and np.ptp(late) < 1.1 * np.ptp(early)
+    assert order(found[-1], column)["least_distance"] > 0.9
+
+
+@pytest.mark.parametrize("duration", [0.4, 0.8])
+def test_rows_of_sph_do_not_slide_past_each_other(duration):
+    channel = bingham_channel.scenarios(bingham_channel.HALF / 12)["channel"]
+    channel = channel.model_copy(update={"duration": duration, "output_interval": duration / 4})
+    last = frames(channel, "sph")[-1]
+    y, u = last["position"][:, 1].astype(float), last["velocity"][:, 0].astype(float)
+    assert relative_l2(u, bingham_channel.exact(y)) < 0.1
+    assert order(last, channel)["least_distance"] > 0.75
