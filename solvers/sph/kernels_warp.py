@@ -118,9 +118,9 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
     """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
-    `move`). Sums: diffusion, the first moment (3), crowding (3); then of liquids the second moment, the
-    inflow and the rate of shear squared over 5, of what has strength the velocity gradient (9), the second moment
-    (xx yy zz xy xz yz) and the motion off the mean of the neighbours (3).
+    `move`). Sums: diffusion, the first moment (3), crowding (3); then of liquids the second moment, the inflow and the
+    rate of shear squared over 5, of what has strength the velocity gradient (9), the second moment (xx yy zz xy xz yz)
+    and the motion off the mean of the neighbours (3).
     """
     sums_of = 25 if strength else 10
     state_of = STATE[strength, changing] // 4
@@ -207,11 +207,8 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
         if flows and not is_solid(phase):
             data.shift[i] = out_of_crowd(crowd / rho, num.h, num.shifting * strain)
             drift = drifted(num, phase, rho, rest, second, first_moment)
-            inflow += (
-                sound
-                / num.h
-                * (num.density_feedback * drift + 2.0 * num.density_diffusion * num.h * num.h * spread / rho)
-            )
+            inflow += num.density_feedback * sound / num.h * drift
+            inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
         rho += h * inflow
         if not (rho > -rest and rho < CRUSHED * rest):
             raise_fault(data.fault, FAULT_STATE)
