@@ -40,7 +40,7 @@ def test_verdicts():
     case = cases()["slump_slip"]
     assert trial(case, "mpm", 0.01).verdict == PASS
     assert trial(case, "mpm", 0.9).verdict == MISS and trial(case, "mpm", 0.9).note == "no cause known"
-    assert trial(case, "sph", 0.9).verdict == EXEMPT and trial(case, "sph", 0.01).verdict == PASS
+    assert trial(case, "pbd", 0.9).verdict == EXEMPT and trial(case, "pbd", 0.01).verdict == PASS
     assert trial(case, "mpm", math.nan).verdict == MISS
 
 
