@@ -11,7 +11,7 @@ from pydantic import Field
 from fluidbench.method.contract import Config, Economy
 from fluidbench.method.features import Feature
 from fluidbench.method.target import BACKENDS
-from fluidbench.method.timestep import Bound, damped_limit
+from fluidbench.method.timestep import Bound
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 from fluidbench.native.solver import Solver
@@ -24,9 +24,10 @@ from ..constitutive import STRETCHED
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import wendland, wendland_slope
+from ..smoothing import wendland
 from ..theory import sph_numbers, stable_dt
 from . import kernels_warp as kernels
+from .lattice import hourglass_limit, lattice_moments, opposing
 from .particle import Smoothing
 
 NonNegative = Annotated[float, Field(ge=0)]
@@ -341,45 +342,3 @@ class SolverSPH(Solver):
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}
         return own | self.neighbours.footprint()
-
-
-def lattice(ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 3) of a unit lattice about a particle and -W'/r there (n,), with h = ratio."""
-    axis = np.arange(-int(2 * ratio) - 1, int(2 * ratio) + 2)
-    places = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3).astype(float)
-    slopes = [-wendland_slope(float(np.linalg.norm(place)) / ratio, ratio) for place in places]
-    return places, np.array(slopes)
-
-
-def lattice_moments(ratio: float) -> tuple[float, float]:
-    """Sums over a unit lattice with h = ratio, each 1 in the continuum: the second moment -sum V r^2 W' / (3 r), which
-    scales summed density, and the fourth -5 sum V x^2 z^2 W' / r^3, which scales viscosity in shear."""
-    places, slopes = lattice(ratio)
-    r2 = (places**2).sum(axis=1)
-    fourth = slopes * places[:, 0] ** 2 * places[:, 2] ** 2 / np.maximum(r2, 1.0)
-    return float((slopes * r2).sum() / 3.0), float(5.0 * fourth.sum())
-
-
-def opposing(ratio: float, axes: int = 1) -> float:
-    """Sum of -V W' / r over the partners in a unit lattice that move against a particle in the shortest wave along one
-    axis, or along the diagonal of several.
-
-    A velocity v in that wave has q = 2 v opposing; with l = 1 / opposing (in spacings) g does the work that the stress
-    between neighbours would do, G (2 v / d)^2 / 2 a volume, at zeta = 1, and at zeta = pi^2 / 4 the shortest wave is as
-    fast as all others.
-    """
-    places, slopes = lattice(ratio)
-    return float(slopes[places[:, :axes].sum(axis=1) % 2 == 1].sum())
-
-
-def hourglass_limit(ratio: float, zeta: float, shear_speed: float, alpha_c: float) -> float:
-    """Largest stable dt over the spacing [s/m] of waves that no gradient shows, along axes and diagonals.
-
-    They have omega = 2 sqrt(zeta) c_s f / d and are damped at 4 f^2 nu / d^2, with nu = alpha h c / 10 and f being
-    `opposing` over that along an axis.
-    """
-    f = max(opposing(ratio, axes) for axes in (1, 2, 3)) / opposing(ratio)
-    wave = math.sqrt(zeta) * shear_speed * f
-    damping = 4.0 * f * f * alpha_c * ratio / 10.0
-    viscous = 2.0 / damping if damping > 0 else math.inf
-    return damped_limit(1.0 / wave, viscous) if wave > 0 else viscous

@@ -13,7 +13,7 @@ from fluidbench.registry import get_method
 from fluidbench.scenario.library import define
 from solvers.smoothing import wendland, wendland_slope
 from solvers.sph import particle
-from solvers.sph.solver import hourglass_limit, lattice_moments, opposing
+from solvers.sph.lattice import hourglass_limit, lattice_moments, opposing
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
 SIDE = 8
