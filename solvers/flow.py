@@ -30,3 +30,10 @@ def strained(phase: Phase, modulus: float, l: wp.mat33, b: wp.vec3, s: wp.vec3, 
         h,
     )  # fmt: skip
     return wp.vec3(xx, yy, zz), wp.vec3(xy, xz, yz), kept
+
+
+@wp.func
+def shear_rate(l: wp.mat33):
+    """sqrt(2 dev D : dev D) [1/s] of a velocity gradient."""
+    d = 0.5 * (l + wp.transpose(l))
+    return wp.sqrt(wp.max(2.0 * (wp.ddot(d, d) - wp.trace(d) * wp.trace(d) / 3.0), 0.0))

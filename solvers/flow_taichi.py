@@ -35,3 +35,10 @@ def strained(phase, modulus, l, b, s, h):
         h,
     )
     return vec3(xx, yy, zz), vec3(xy, xz, yz), kept
+
+
+@ti.func
+def shear_rate(l):
+    """sqrt(2 dev D : dev D) [1/s] of a velocity gradient."""
+    d = 0.5 * (l + l.transpose())
+    return ti.sqrt(ti.max(2.0 * (d.norm_sqr() - d.trace() ** 2 / 3.0), 0.0))

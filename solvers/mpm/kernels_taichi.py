@@ -7,7 +7,7 @@ from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Outlet
 
-from ..flow_taichi import pressure, strained
+from ..flow_taichi import pressure, shear_rate, strained
 from ..smoothing import quadratic_spline
 from ..taichi_bridge import (
     Floats,
@@ -135,9 +135,7 @@ def g2p(
                 velocity[p] = v
                 crowding = density * volume_ratio[p] / phase.density
                 if not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
-                    strain = 0.5 * (moment + moment.transpose())
-                    strain -= (strain.trace() / 3.0) * ti.Matrix.identity(ti.f32, 3)
-                    amount = ti.min(shifting * h * ti.sqrt(2.0 * strain.norm_sqr()), STEEPEST)
+                    amount = ti.min(shifting * h * shear_rate(moment), STEEPEST)
                     x -= (4.0 * amount / phase.density) * lean * grid.dx
             elif held[p] == CARRIED:
                 ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] + 0.5 * outlet.spacing - x[2]) - v[2]

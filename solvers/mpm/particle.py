@@ -8,7 +8,7 @@ from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import STICK, Outlet, Phase, is_solid, too_fast
 
 from ..bind import warp_func
-from ..flow import pressure, strained
+from ..flow import pressure, shear_rate, strained
 from ..smoothing import quadratic_spline
 from .grid import Grid, first_node
 
@@ -199,10 +199,8 @@ def shifted(grid: Grid, phase: Phase, sums: wp.mat44, c: wp.mat33, step: float, 
     by = wp.vec3(0.0, 0.0, 0.0)
     crowding = sums[0, 3] * volume_ratio / phase.density
     if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
-        d = 0.5 * (c + wp.transpose(c))
-        strain = wp.sqrt(wp.max(2.0 * (wp.ddot(d, d) - wp.trace(d) * wp.trace(d) / 3.0), 0.0))
         # 4 sum w rho (x_i - x) is dx^2 grad(rho)
-        by = -(wp.min(step * strain, STEEPEST) * 4.0 / phase.density) * wp.cw_mul(
+        by = -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / phase.density) * wp.cw_mul(
             wp.vec3(sums[1, 3], sums[2, 3], sums[3, 3]), grid.dx
         )
     return by

@@ -11,7 +11,7 @@ from fluidbench.native.scene import PERIODIC
 from ..aging import DISORDER
 from ..corrected import SOUND
 from ..corrected_taichi import elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
-from ..flow_taichi import pressure, strained
+from ..flow_taichi import pressure, shear_rate, strained
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_traction, image_velocity
 from ..pairs_taichi import (
@@ -250,8 +250,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
                         z = kept * (z + h * (0.5 * (gradient - gradient.transpose()) @ z + off))
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
-                    d = 0.5 * (gradient + gradient.transpose())
-                    sheared = ti.sqrt(ti.max(2.0 * (d.norm_sqr() - d.trace() ** 2 / 3.0), 0.0))
+                    sheared = shear_rate(gradient)
                 else:
                     second, approach = sums[7], sums[8]
                     sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)

@@ -19,11 +19,11 @@ from fluidbench.native.vector_access import store_vec4
 from ..aging import rest_density
 from ..bind import warp_func
 from ..corrected import SOUND, elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
-from ..flow import pressure, strained
+from ..flow import pressure, shear_rate, strained
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
-from .particle import Smoothing, drifted, off_linear, out_of_crowd, pulled_back, shear_rate
+from .particle import Smoothing, drifted, off_linear, out_of_crowd, pulled_back
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 

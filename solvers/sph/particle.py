@@ -26,7 +26,6 @@ class Smoothing:
     """Numbers of the discretisation."""
 
     h: float  # smoothing length [m]
-    spacing: float  # [m]
     near: float  # kernel at the distance below which partners crowd each other [1/m^3]
     compact: float  # l^2: makes the shortest wave as stiff as between neighbours in a lattice [m^2]
     viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
@@ -53,20 +52,12 @@ def pulled_back(phase: Phase, stiffness: float, damping: float, z: wp.vec3, q: w
 
 
 @wp.func
-def shear_rate(gradient: wp.mat33):
-    """sqrt(2 dev D : dev D) [1/s]."""
-    d = 0.5 * (gradient + wp.transpose(gradient))
-    mean = wp.trace(d) / 3.0
-    return wp.sqrt(wp.max(2.0 * (wp.ddot(d, d) - 3.0 * mean * mean), 0.0))
-
-
-@wp.func
 def out_of_crowd(crowd: wp.vec3, h: float, strain: float):
     """How far a particle is shifted [m] while matter shears by `strain` times the constant: -strain h^2 crowd.
 
     `crowd` [1/m] is sum_j V_j grad W (W^4 / W(r0)^4 - 1) over partners nearer than r0 = 0.9 d: the shifting of Lind et
-    al. (2012), by the tensile control of Monaghan (2000) alone. Partners push each other alike, so the centre of mass
-    stays; a lattice and its free surface feel nothing; what rests, flies or turns does not shear.
+    al. (2012), by the tensile control of Monaghan (2000) alone. Partners push each other alike where both shear alike;
+    a lattice and its free surface feel nothing; what rests, flies or turns does not shear.
     """
     return -(wp.min(strain, FARTHEST) * h * h) * crowd
 

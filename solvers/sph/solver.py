@@ -52,7 +52,7 @@ class ConfigSPH(Config):
     )
     shifting: NonNegative = Field(4.0, description="shift out of a crowd, over strain and h^2 times its gradient")
     density_feedback: NonNegative = Field(
-        0.05, description="rate, in c / h, at which integrated density follows the summed one, except in solids"
+        0.05, description="rate, in c / h, at which integrated density follows the summed one, where matter flows"
     )
     density_tolerance: NonNegative = Field(0.03, description="gap between the two that is left alone, over the density")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
@@ -172,7 +172,6 @@ class SolverSPH(Solver):
         self.num = Smoothing()
         ratio = config.smoothing(scene.scenario.material)
         self.num.h = ratio * scene.spacing
-        self.num.spacing = scene.spacing
         self.num.near = wendland(CLOSE * scene.spacing / self.num.h, self.num.h)
         second, fourth = lattice_moments(ratio)
         self.num.lattice, self.num.viscous_lattice = 1.0 / second, fourth**-0.5
