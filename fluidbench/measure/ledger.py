@@ -34,28 +34,39 @@ def ledger(frame: Frame, scenario: Scenario) -> dict[str, float]:
 
 
 def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
-    """Every length that the scenario calls for, all from the deposited field, with its resolution."""
+    """Every length that the scenario calls for, all from the deposited field, with its resolution: a single bead's once
+    the path has been travelled."""
     deposit = deposit_of(frame, scenario)
     row = {"resolution_m": deposit.spacing, "top_m": deposit.top() - scenario.domain.lower[2]}
     row |= measure_slump(deposit, scenario)
     if is_tower(scenario):
         row |= standing(deposit, scenario)
+    elif scenario.track is not None and float(frame["time"]) >= scenario.track.end * (1.0 - 1e-6):
+        row |= beads(frame, deposit, scenario)
     return row | progress(frame, scenario)
+
+
+def beads(frame: Frame, deposit: Deposit, scenario: Scenario) -> dict[str, float]:
+    """Section of the bead and rise of the layers along what was laid of the path."""
+    if scenario.toolpath is None:
+        return {}
+    free = frame["held"] != CARRIED
+    bead = measure_bead(deposit, scenario, laid_share(frame["birth_time"][free], scenario))
+    if bead is None:
+        return {}
+    rises = layer_heights(frame["position"][free], frame["birth_time"][free], scenario)
+    return bead.summary(scenario.toolpath.layers) | {f"layer_{i}_height_m": rise for i, rise in enumerate(rises, 2)}
 
 
 def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """`lengths` and what only the finished print shows: beads and layers."""
     row = lengths(frame, scenario)
-    free = frame["held"] != CARRIED
-    laid = laid_share(frame["birth_time"][free], scenario)
-    bead = measure_bead(deposit_of(frame, scenario), scenario, laid)
-    if bead is not None and scenario.toolpath is not None:
-        row |= bead.summary(scenario.toolpath.layers)
-        for i, rise in enumerate(layer_heights(frame["position"][free], frame["birth_time"][free], scenario), 2):
-            row[f"layer_{i}_height_m"] = rise
-        if scenario.toolpath.kind == "ring" and scenario.toolpath.center is not None:
-            center = np.average(frame["position"][free, :2], axis=0, weights=frame["mass"][free])
-            row["ring_drift_m"] = float(np.hypot(*(center - scenario.toolpath.center)))
+    if "bead_width_m" not in row:
+        row |= beads(frame, deposit_of(frame, scenario), scenario)
+    free, path = frame["held"] != CARRIED, scenario.toolpath
+    if path is not None and path.kind == "ring" and path.center is not None and path.speed > 0:
+        center = np.average(frame["position"][free, :2], axis=0, weights=frame["mass"][free])
+        row["ring_drift_m"] = float(np.hypot(*(center - path.center)))
     if is_tower(scenario):
         row |= measure_tower(frame, scenario)
     if scenario.material.expansion is not None:

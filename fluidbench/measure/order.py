@@ -1,18 +1,12 @@
-"""In what order matter ended: how near particles came, how dense it is, and whether it rests."""
+"""In what order matter ended: how near particles came, and how dense it is."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..method.frame import CARRIED, Frame
 from ..scenario import Scenario
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-LAST = 0.2  # share of the time over which creep is taken
 DEPARTED = 0.05  # of mean density from rest, beyond which a run says so
 CELL = 2.0  # edge of the cells in which particles are counted, in spacings
 
@@ -40,18 +34,6 @@ def order(frame: Frame, scenario: Scenario) -> dict[str, float]:
         "largest_density": float(density.max()),
         "most_in_cell": float(filled.max()) / CELL**3,
     }
-
-
-def creep(series: pd.DataFrame) -> dict[str, float]:
-    """Largest change of any length per second over the last fifth of a run [m/s]; nothing without lengths."""
-    lengths = [name for name in series if name.endswith("_m") and not name.startswith(("resolution", "center"))]
-    if not lengths or len(series) < 2:
-        return {}
-    time = series["time_s"].to_numpy()
-    begins = min(int(np.searchsorted(time, (1.0 - LAST) * time[-1] * (1.0 + 1e-9), side="right")) - 1, len(time) - 2)
-    span = time[-1] - time[begins]
-    change = series[lengths].iloc[-1] - series[lengths].iloc[begins]
-    return {"creep_m_per_s": float(change.abs().max() / span)} if span > 0 else {}
 
 
 def departures(measures: dict[str, float]) -> list[str]:

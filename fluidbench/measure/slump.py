@@ -10,8 +10,7 @@ def measure_slump(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     """Slump and spread of the first body, if it is a cylinder; front and height of it, if it is a box."""
     if not scenario.bodies or any(body.start > 0 for body in scenario.bodies):
         return {}
-    body, floor = scenario.bodies[0], scenario.domain.lower[2]
-    start = float(body.center[2] + body.extent[2]) - floor
+    body, floor, start = scenario.bodies[0], scenario.domain.lower[2], height_before(scenario)
     if body.kind == "cylinder" and body.where is None:
         x, y = body.center[0], body.center[1]
         top = deposit.top(x, y, within=0.25 * float(body.extent[0])) - floor
@@ -19,6 +18,12 @@ def measure_slump(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     if body.kind == "box":
         return {"front_x_m": front(deposit) - scenario.domain.lower[0], "height_m": deposit.top() - floor}
     return {}
+
+
+def height_before(scenario: Scenario) -> float:
+    """Height to which the first body reaches at the start [m]."""
+    body = scenario.bodies[0]
+    return float(body.center[2] + body.extent[2]) - scenario.domain.lower[2]
 
 
 def front(deposit: Deposit) -> float:

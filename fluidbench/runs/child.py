@@ -1,14 +1,17 @@
 """What a run's own process does: simulate, measure, and leave series, last snapshot and record in its folder."""
 
+from __future__ import annotations
+
 import math
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..files import write_npz, write_parquet
 from ..method.contract import Session
+from ..method.frame import Frame
 from ..method.suitability import approximations
 from ..method.verdict import FINAL, Verdict
 from ..method.vitals import Vital
@@ -22,15 +25,16 @@ from .job import Job
 from .provenance import HARDWARE, machine
 from .record import FINAL_FRAME, SERIES, Cost, Record, frame_name, keep
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) -> Record:
     """Run a job in this process; writes the series, the last snapshot and the record into the folder."""
     import pandas as pd
 
-    from ..measure.ledger import final_lengths, ledger, lengths
-    from ..measure.order import creep, departures, order
-    from ..measure.reference import answers
-    from ..measure.tower import is_tower, success, verdict_of
+    from ..measure.ledger import ledger, lengths
+    from ..measure.rest import at_rest
 
     scenario = Scenario.model_validate(job.scenario)
     method = get_method(job.method)
@@ -51,36 +55,30 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
             write_npz(folder / frame_name(len(rows) - 1), frame)
         report({"time": session.now, "until": scenario.duration, "speed": vital.speed})
 
-    outcome = Drive(session, scenario, observe, job.wall_limit, checkpoints, film).run()
+    def rests() -> bool:
+        return at_rest(pd.DataFrame(rows), scenario)
+
+    awaited = rests if scenario.until == "rest" else None
+    outcome = Drive(session, scenario, observe, job.wall_limit, checkpoints, film, awaited).run()
     undrawn = [] if film is None else [text for text in [film.close()] if text]
     frame, series = session.frame(), pd.DataFrame(rows)
     write_parquet(folder / SERIES, series)
     write_npz(folder / FINAL_FRAME, frame)
     frames = [frame_name(i) for i in range(len(rows))] if job.keep_frames else []
-    complete = outcome.verdict is Verdict.COMPLETED
-    final = (
-        {**ledger(frame, scenario), **final_lengths(frame, scenario), **order(frame, scenario), **creep(series)}
-        if complete
-        else {}
-    )
-    compared, not_compared = answers(scenario, series, final) if complete else ([], [])
-    criteria = success(scenario, final, series) if complete and is_tower(scenario) else []
+    found = results(scenario, frame, series) if outcome.verdict is Verdict.COMPLETED else {}
+    warnings = scenario.warnings() + undrawn + found.pop("warnings", [])
     record = Record(
         **heading,
         verdict=outcome.verdict,
         reason=outcome.reason,
-        measures=final,
-        answers=tuple(compared),
-        not_compared=tuple(not_compared),
-        success=tuple(criteria),
-        print=verdict_of(criteria) if criteria else None,
+        **found,
         cost=cost(outcome, session, time.perf_counter() - start),
         **session.statistics(),
         bytes=session.footprint(),
         bounds_s={b.name: b.dt for b in session.bounds()},
         binding_s=outcome.binding,
         approximations=tuple(approximations(method, scenario, session.config)),
-        warnings=tuple(scenario.warnings() + undrawn + _numberless(final) + departures(final)),
+        warnings=tuple(warnings),
         config=session.config.model_dump(),
         input=scenario.model_dump(mode="json"),
         machine=about,
@@ -92,6 +90,30 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         checkpoints.discard()
     session.close()
     return record
+
+
+def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str, Any]:
+    """What a completed run comes to, by the names that its record has for it."""
+    from ..measure.ledger import final_lengths, ledger
+    from ..measure.order import departures, order
+    from ..measure.reference import answers
+    from ..measure.rest import at_rest, creep, moving
+    from ..measure.tower import is_tower, success, verdict_of
+
+    final = ledger(frame, scenario) | final_lengths(frame, scenario) | order(frame, scenario) | creep(series, scenario)
+    compared, not_compared = answers(scenario, series, final)
+    criteria = success(scenario, final, series) if is_tower(scenario) else []
+    restless = scenario.until == "rest" and not at_rest(series, scenario)
+    unrest = [f"still moves after {scenario.duration:g} s, and was to be at rest"] if restless else []
+    return {
+        "measures": final,
+        "moving": moving(series, scenario),
+        "answers": tuple(compared),
+        "not_compared": tuple(not_compared),
+        "success": tuple(criteria),
+        "print": verdict_of(criteria) if criteria else None,
+        "warnings": _numberless(final) + departures(final) + unrest,
+    }
 
 
 def _numberless(measures: dict[str, float]) -> list[str]:

@@ -60,7 +60,7 @@ class Drive:
     """A session on its way through a scenario: run to the end, or until something breaks.
 
     `observe` is called at every output, checkpoints are written off the clock, pictures are taken on it. With
-    checkpoints the run goes on from one where there is one.
+    checkpoints the run goes on from one where there is one. Where `rests` says so at an output, the run is complete.
     """
 
     session: Session
@@ -69,12 +69,14 @@ class Drive:
     wall_limit: float | None = None
     checkpoints: Checkpoints | None = None
     camera: Camera | None = None
+    rests: Callable[[], bool] | None = None
     outcome: Outcome = field(default_factory=Outcome)
 
     def __post_init__(self) -> None:
         tick, ticks, per_output = self.scenario.schedule
         self.end, self.interval = tick * ticks, tick * per_output
         self.near = 1e-6 * tick  # two times nearer than this are the same
+        self.rested = False
 
     def run(self) -> Outcome:
         outcome, session = self.outcome, self.session
@@ -83,9 +85,10 @@ class Drive:
         outcome.prepare_wall = time.perf_counter() - start
         if self.checkpoints is None or not self.checkpoints.restore(outcome):
             self.begin()
-        while session.now < self.end - self.near and outcome.verdict is Verdict.COMPLETED:
+        while session.now < self.end - self.near and outcome.verdict is Verdict.COMPLETED and not self.rested:
             self.leg()
-            if self.checkpoints is not None and self.checkpoints.due() and outcome.verdict is Verdict.COMPLETED:
+            going = outcome.verdict is Verdict.COMPLETED and not self.rested
+            if self.checkpoints is not None and self.checkpoints.due() and going:
                 self.checkpoints.write(outcome)
         outcome.simulated = session.now
         if outcome.verdict is Verdict.COMPLETED:
@@ -139,6 +142,9 @@ class Drive:
         else:
             if self.observe is not None and at_output:
                 self.observe(session, vital)
+                self.rested = self.rests is not None and self.rests()
+            if self.rested:
+                return
             if late := self.too_slow():
                 if time < session.now - self.near and (now := session.look()).complaint:
                     self.judge(now, False)  # not late but broken, since the last news

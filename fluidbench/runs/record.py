@@ -75,6 +75,7 @@ class Record(BaseModel):
     verdict: Verdict
     reason: str = ""
     measures: dict[str, float] = {}
+    moving: tuple[str, ...] = ()  # lengths among them that still changed at the end
     answers: tuple[Answer, ...] = ()
     not_compared: tuple[str, ...] = ()  # why references do not apply
     success: tuple[Criterion, ...] = ()  # of a print

@@ -64,6 +64,12 @@ class Expansion(Model):
         return self
 
     @property
+    def last_event(self) -> float:
+        """Age by which growth has begun everywhere, or the last children are there [s]."""
+        passes = self.passes - 1 if self.kind == "spawn" else 0
+        return self.delay + self.jitter + passes * self.interval
+
+    @property
     def per_pass(self) -> float:
         """Volume ratio of one pass of spawning."""
         return self.ratio ** (1.0 / self.passes)

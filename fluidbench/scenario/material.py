@@ -114,6 +114,11 @@ class Material(Model):
         return math.sqrt((self.bulk(liquid_sound_speed) + 4.0 * self.shear_modulus / 3.0) / self.density)
 
     @property
+    def steady_viscosity(self) -> float:
+        """What resists a steady flow at a shear rate of 1/s, beside the yield stress [Pa s]."""
+        return self.viscosity + self.plastic_viscosity + self.shear_modulus * (self.relaxation_time or 0.0)
+
+    @property
     def is_solid(self) -> bool:
         """Whether it never flows: elastic, without relaxation, yielding not before a shear of 100 % if at all."""
         elastic = self.youngs_modulus is not None and self.relaxation_time is None

@@ -48,7 +48,10 @@ class Scenario(Model):
     toolpath: Toolpath | None = None
     collider: Collider | None = Field(None, description="a rigid body carried along the toolpath")
     bodies: tuple[Body, ...] = ()
-    duration: Positive = Field(description="simulated time [s]")
+    duration: Positive = Field(description="simulated time, or its limit [s]")
+    until: Literal["duration", "rest"] = Field(
+        "duration", description="rest: a run ends once nothing moves any more (docs/physics.md, measures)"
+    )
     output_interval: Positive | None = Field(None, description="time between outputs [s]; default duration / 20")
     tick: Positive | None = Field(None, description="time between emission events and re-planned substeps [s]")
     spacing: Positive = Field(description="particle spacing d [m]; a particle stands for d^3")
@@ -219,6 +222,12 @@ class Scenario(Model):
         points += [] if self.track is None else [self.track.position]
         arm = np.concatenate(points) - np.asarray(self.body_force_center)
         return float(np.linalg.norm(self.acceleration + arm @ self.gradient.T, axis=1).max())
+
+    @property
+    def events_end(self) -> float:
+        """When the last matter has been added, and expands [s]; from then on it is left to itself."""
+        added = [0.0 if self.track is None else self.track.end, *(body.start for body in self.bodies)]
+        return max(added) + (0.0 if self.material.expansion is None else self.material.expansion.last_event)
 
     @cached_property
     def reference_speed(self) -> float:

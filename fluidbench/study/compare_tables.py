@@ -12,6 +12,9 @@ from ..report.table import Table, label, number, spread
 from ..runs.record import Record, Run
 from .lengths import lengths_of
 
+MOVES = " ~"  # beside a length that was read from what still moved
+MOVED = "by more than 0.05 spacings over the last fifth of the run"
+
 
 def by_method(results: Sequence[Run]) -> dict[str, list[Record]]:
     """Records of each method, in the order of the runs."""
@@ -34,8 +37,10 @@ def fidelity(results: Sequence[Run]) -> Table:
     keys = dict.fromkeys(k for g in done.values() for r in g for k in r.measures if not k.startswith(hidden))
     for key in keys:
         values = [[r.measures[key] for r in g if key in r.measures] for g in done.values()]
-        table.rows.append([label(key), *[spread(v) if v else "-" for v in values]])
-    return table
+        marks = [MOVES if any(key in r.moving for r in g) else "" for g in done.values()]
+        table.rows.append([label(key), *[spread(v) + m if v else "-" for v, m in zip(values, marks, strict=True)]])
+    moving = any(r.moving for g in done.values() for r in g)
+    return replace(table, note=f"{MOVES.strip()} still moves: {MOVED}") if moving else table
 
 
 def against_reference(results: Sequence[Run]) -> Table | None:
@@ -43,13 +48,13 @@ def against_reference(results: Sequence[Run]) -> Table | None:
     table = Table("Against references", ["", "method", "measured", "reference", "error", "measure", "source"])
     reasons = dict.fromkeys(line for r in results for line in r.record.not_compared)
     for result in results:
+        moved = {result.record.measures[key] for key in result.record.moving}
         if result.record.repeat == 0:
             for a in result.record.answers:
+                measured = number(a.measured) + (MOVES if a.measured in moved else "")
                 percent = not a.measure.startswith(("absolute", "in discs"))
                 error = f"{100 * a.error:.2f} %" if percent else f"{a.error:.4f}"
-                table.rows.append(
-                    [a.quantity, result.label, number(a.measured), number(a.reference), error, a.measure, a.source]
-                )
+                table.rows.append([a.quantity, result.label, measured, number(a.reference), error, a.measure, a.source])
     table = replace(table, note="\n".join(f"not compared: {line}" for line in reasons))
     return table if table.rows or reasons else None
 

@@ -158,6 +158,10 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> S
         result.limits[method] = {key: fit.limit for key, fit in fits[method].items()}
         if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0])):
             result.erratic.add(method)
+    for run in runs:
+        if restless := [key for key in run.record.moving if key in lengths_of(run.record)]:
+            still = f"at spacing {run.record.spacing_m:.4g} m"
+            result.notes.append(f"{run.method} {still}: not at rest at the end: {', '.join(restless)}")
     consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
     if not trusted:
         result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")

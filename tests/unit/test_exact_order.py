@@ -1,10 +1,9 @@
-"""How near, how dense, how still: numbers worked out by hand."""
+"""How near and how dense: numbers worked out by hand."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from fluidbench.measure.order import creep, departures, order
+from fluidbench.measure.order import departures, order
 from fluidbench.method.frame import CARRIED, FREE
 
 from ..conftest import scenario
@@ -36,14 +35,6 @@ def test_a_pair_is_seen_and_what_is_carried_is_not():
     assert [found[f"{k}_density"] for k in ("least", "mean", "largest")] == pytest.approx([0.9, 1.1, 1.3])
     assert found["most_in_cell"] == 2 / 8
     assert order(frame([[0.0, 0.0, 0.0]]), scenario(spacing=0.01)) == {}
-
-
-def test_creep_is_the_fastest_length_of_the_last_fifth():
-    time = np.linspace(0.0, 10.0, 11)
-    series = pd.DataFrame({"time_s": time, "top_m": 1.0 - 0.01 * time, "center_z_m": 5.0 * time, "resolution_m": 0.1})
-    series["spread_m"] = np.where(time > 8.0, 0.03 * (time - 8.0), 0.0)
-    assert creep(series) == {"creep_m_per_s": pytest.approx(0.03)}
-    assert creep(series.iloc[:1]) == {} and creep(series[["time_s", "center_z_m"]]) == {}
 
 
 @pytest.mark.parametrize(("mean", "said"), [(1.0, 0), (1.049, 0), (0.94, 1), (1.06, 1)])

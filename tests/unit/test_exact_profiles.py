@@ -121,6 +121,7 @@ def printed(low, high, d=0.002):
     held = np.append(np.zeros(len(x) - 1, int), int(CARRIED))
     zeros = np.zeros(len(x))
     return {
+        "time": 0.0,
         "held": held,
         "position": x,
         "volume": np.full(len(x), d**3),
@@ -141,6 +142,8 @@ def test_lengths_come_from_the_free_particles_alone_and_count_from_the_floor():
     assert row["resolution_m"] == 0.002 and row["top_m"] == pytest.approx(0.006)
     assert "bead_width_m" not in row
     final = final_lengths(frame, s)
+    assert lengths(frame | {"time": 0.299}, s) == row  # 30 mm at 0.1 m/s
+    assert lengths(frame | {"time": 0.3}, s) == final
     assert row.items() <= final.items()
     assert final["bead_width_m"] == pytest.approx(0.02) and final["bead_height_m"] == pytest.approx(0.006)
     assert not measure_tower(frame, bead(toolpath=RING, duration=2.5)).keys() & final.keys()

@@ -88,6 +88,7 @@ def built(s, ideal=True):
 def judged(s, points, volume, births, before=None):
     """(verdict, measures, criteria) of particles as they are at the end of the print."""
     frame = {
+        "time": s.duration,
         "position": points,
         "velocity": np.zeros_like(points),
         "mass": np.full(len(points), 1000.0 * volume),
@@ -199,6 +200,7 @@ def test_a_print_that_stands_but_sinks_is_deformed():
     s = SCENARIOS[1]
     points, volume, births = built(s)
     fresh = {
+        "time": 0.0,
         "position": points,
         "volume": np.full(len(points), volume),
         "mass": np.full(len(points), volume * 1000.0),
