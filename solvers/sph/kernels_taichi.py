@@ -254,14 +254,15 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 else:
                     second, approach = sums[7], sums[8]
                     sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
-                growth, out = approach, vec3(0.0)
+                growth, crowd = approach, vector_at(sums, 4) / rho
                 if flows and not is_solid(phase):
-                    out = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * vector_at(sums, 4) / rho
                     growth += (
                         num.density_feedback * sound / num.h * drifted(num, phase, rho, rest, second, first_moment)
                     )
                     growth += 2.0 * num.density_diffusion * num.h * sound * spread / rho
-                shift[i] = out
+                else:
+                    crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
+                shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
                 rho += h * growth
                 if rho <= -rest or beyond(rho, CRUSHED * rest):
                     ti.atomic_or(fault[0], FAULT_STATE)

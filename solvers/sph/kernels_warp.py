@@ -23,7 +23,7 @@ from ..flow import pressure, shear_rate, strained
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
-from .particle import Smoothing, drifted, off_linear, out_of_crowd, pulled_back
+from .particle import Smoothing, broken, drifted, off_linear, out_of_crowd, pulled_back
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -203,9 +203,12 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
             second = sums[7]
             inflow = sums[8]
             strain = h * wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
-        data.shift[i] = wp.vec3(0.0, 0.0, 0.0)
-        if flows and not is_solid(phase):
-            data.shift[i] = out_of_crowd(crowd / rho, num.h, num.shifting * strain)
+        crowd /= rho
+        flows = flows and not is_solid(phase)
+        if not flows:
+            crowd = broken(crowd, num.broken)
+        data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * strain)
+        if flows:
             drift = drifted(num, phase, rho, rest, second, first_moment)
             inflow += num.density_feedback * sound / num.h * drift
             inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho

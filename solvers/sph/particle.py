@@ -27,6 +27,7 @@ class Smoothing:
 
     h: float  # smoothing length [m]
     near: float  # kernel at the distance below which partners crowd each other [1/m^3]
+    broken: float  # crowding by a single partner at which a lattice is broken [1/m]
     compact: float  # l^2: makes the shortest wave as stiff as between neighbours in a lattice [m^2]
     viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
     lattice: float  # makes the second moment of a lattice exactly its density [-]
@@ -49,6 +50,13 @@ def off_linear(z: wp.vec3, gradient: wp.mat33, q: wp.vec3, kept: float, dt: floa
 def pulled_back(phase: Phase, stiffness: float, damping: float, z: wp.vec3, q: wp.vec3):
     """g [Pa m]; `stiffness` is zeta l^2 [m^2], `damping` rho nu l^2 [Pa s m^2]."""
     return stiffness * phase.shear_modulus * z + damping * q
+
+
+@wp.func
+def broken(crowd: wp.vec3, limit: float):
+    """What crowds a particle of matter that does not flow [1/m]: the excess over what one partner does at 0.6 d, nearer
+    than any elastic strain brings them. A lattice that is pressed together keeps its order by itself."""
+    return wp.max(1.0 - limit / wp.max(wp.length(crowd), 1.0e-12), 0.0) * crowd
 
 
 @wp.func

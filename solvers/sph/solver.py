@@ -24,7 +24,7 @@ from ..constitutive import STRETCHED
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import wendland
+from ..smoothing import wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
 from . import kernels_warp as kernels
 from .lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
@@ -75,8 +75,15 @@ class ConfigSPH(Config):
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 CLOSE = 0.9  # distance below which particles are moved apart, in spacings
+BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
 HOURGLASS_SAFETY = 0.8  # for the stress and the pressure act on the same waves
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
+
+
+def crowding(r: float, d: float, h: float) -> float:
+    """How much one partner at a distance r [m] crowds a particle [1/m], see `out_of_crowd`."""
+    excess = (wendland(r / h, h) / wendland(CLOSE * d / h, h)) ** 4 - 1.0
+    return d**3 * -wendland_slope(r / h, h) * r * excess
 
 
 class SolverSPH(Solver):
@@ -174,6 +181,7 @@ class SolverSPH(Solver):
         ratio = config.smoothing(scene.scenario.material)
         self.num.h = ratio * scene.spacing
         self.num.near = wendland(CLOSE * scene.spacing / self.num.h, self.num.h)
+        self.num.broken = crowding(BROKEN * scene.spacing, scene.spacing, self.num.h)
         self.num.lattice, self.num.viscous_lattice = 1.0 / lattice_moments(ratio)[0], viscous_scale(ratio)
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)

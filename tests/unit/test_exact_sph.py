@@ -15,6 +15,7 @@ from solvers.flow import shear_rate
 from solvers.smoothing import wendland, wendland_slope
 from solvers.sph import particle
 from solvers.sph.lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
+from solvers.sph.solver import crowding
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
 SIDE = 8
@@ -131,13 +132,18 @@ def test_particles_leave_a_crowd_as_fast_as_matter_shears():
 
 
 PASTE = {"yield_stress": 1e-6}
+ELASTIC = {"yield_stress": 1e9}
 LIQUID = {"youngs_modulus": None, "poisson_ratio": None, "sound_speed": 10.0}
 
 
-@pytest.mark.parametrize("material", [PASTE, LIQUID])
-@pytest.mark.parametrize("gap", [0.95, 0.8, 0.5])
-def test_only_near_partners_crowd_each_other(material, gap):
-    """Two that have come together in a lattice that shears at 1 1/s; 0.9 spacings is near enough to be left alone."""
+@pytest.mark.parametrize(
+    ("material", "gap", "moves"),
+    [(m, gap, gap < 0.9) for m in (PASTE, LIQUID) for gap in (0.95, 0.8, 0.5)]
+    + [(ELASTIC, gap, gap < 0.6) for gap in (0.8, 0.63, 0.5)],
+)
+def test_only_near_partners_crowd_each_other(material, gap, moves):
+    """Two that have come together in a lattice that shears at 1 1/s: what flows is left alone to 0.9 spacings, what
+    strains elastically to 0.6, and beyond it feels the excess."""
     config = {"shifting": 4.0, "smoothing_ratio_solid": 1.5, "smoothing_ratio": 1.5}
     simulation = block(config, **material)
     pool = simulation.pool
@@ -151,13 +157,20 @@ def test_only_near_partners_crowd_each_other(material, gap):
     simulation.kick(np.stack([0 * moved[:, 0], moved[:, 2] % SIDE, 0 * moved[:, 0]], axis=1))
     simulation.march(dt, 1)
     shift = simulation.solver.shift.numpy()[[first, second], 0].astype(float) / (4.0 * dt * 1.5**2)
-    if gap > 0.9:
+    if not moves:
         assert not shift.any()
     else:
         assert shift[0] < 0.0 < shift[1]
     if gap == 0.5:  # what else is near adds little
-        crowding = (wendland(0.5 / 1.5, 1.5) / wendland(0.9 / 1.5, 1.5)) ** 4 - 1.0
-        assert shift[1] - shift[0] == pytest.approx(-2.0 * wendland_slope(0.5 / 1.5, 1.5) * 0.5 * crowding, rel=0.35)
+        left = crowding(0.6, 1.0, 1.5) if material is ELASTIC else 0.0
+        assert shift[1] - shift[0] == pytest.approx(2.0 * (crowding(0.5, 1.0, 1.5) - left), rel=0.35)
+
+
+def test_crowding_by_one_partner_by_hand():
+    excess = (wendland(0.5 / 1.5, 1.5) / wendland(0.9 / 1.5, 1.5)) ** 4 - 1.0
+    assert crowding(0.5, 1.0, 1.5) == pytest.approx(-wendland_slope(0.5 / 1.5, 1.5) * 0.5 * excess)
+    assert crowding(0.005, 0.01, 0.015) == pytest.approx(100.0 * crowding(0.5, 1.0, 1.5))  # 1/m
+    assert crowding(0.9, 1.0, 1.5) == pytest.approx(0.0)
 
 
 def test_sums_over_a_lattice_by_hand():
