@@ -4,7 +4,7 @@ A solver says which pass it wants and with what; kernel files of both languages 
 arguments. Taichi is imported only where it is asked for.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import warp as wp
@@ -20,6 +20,10 @@ class Backend(Protocol):
     name: str
 
     def launch(self, kernel: Any, size: int, inputs: Sequence[Any], outputs: Sequence[Any] = ()) -> None: ...
+
+    def repeat(self, going: wp.array, body: Callable[[], None]) -> None:
+        """Launch what `body` launches again and again, as long as going[0] is not 0, which it has to see to."""
+        ...
 
     def prepare(self, solver: Any) -> None:
         """Compile all kernels of a solver (`solver.kernels`)."""
@@ -37,6 +41,9 @@ class Warp:
 
     def __init__(self, crew: Crew) -> None:
         self.device, self.launch, self.load = crew.device, crew.launch, crew.load
+
+    def repeat(self, going: wp.array, body: Callable[[], None]) -> None:
+        wp.capture_while(going, body)  # inside a graph, too
 
     def prepare(self, solver: Any) -> None:
         for name in {kernel.module.name for kernel in vars(solver.kernels).values()}:

@@ -1,6 +1,6 @@
 """Interpolation kernels and splines, as plain laws of floats (see bind.py)."""
 
-from math import pi
+from math import pi, sqrt
 
 
 def wendland(q: float, h: float):
@@ -13,6 +13,17 @@ def wendland_slope(q: float, h: float):
     """(dW/dr) / r of the Wendland C2 kernel [1/m^5]: grad W = slope * (x_i - x_j), finite at r = 0."""
     t = max(1.0 - 0.5 * q, 0.0)
     return -105.0 / (16.0 * pi * h * h * h * h * h) * t * t * t
+
+
+def drag_weight(q: float, support: float):
+    """Weight w(r) [1/m^5] of viscous drag between two at r = q support: sum_j V_j w r_a r_b r_c r_d / r^2 is that of an
+    isotropic tensor, 1/5 for xxzz, exactly in the continuum and to 4 % in a cubic lattice, whatever the support from
+    2.4 to 3.6 spacings. (A kernel's own -W' / r weighs the nearest too much: 17 % too little in shear along the axes
+    at 2.4 spacings, 22 % too much across.) Of q^m (1 - q)^n this comes nearest.
+    """
+    t = max(1.0 - q, 0.0)
+    s = support * support * support * support * support
+    return 156.6325 / s * q * sqrt(q) * t * t * t
 
 
 def poly6(r2: float, support: float):

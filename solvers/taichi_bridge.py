@@ -25,7 +25,7 @@ from fluidbench.native.scene import Phase
 
 from .bind import rebound
 
-vec3, vec4, ivec3, mat3 = ti.math.vec3, ti.math.vec4, ti.math.ivec3, ti.math.mat3
+vec2, vec3, vec4, ivec3, mat3 = ti.math.vec2, ti.math.vec3, ti.math.vec4, ti.math.ivec3, ti.math.mat3
 Floats = ti.types.ndarray(dtype=ti.f32, ndim=1)
 Ints = ti.types.ndarray(dtype=ti.i32, ndim=1)
 Vectors = ti.types.ndarray(dtype=vec3, ndim=1)
@@ -198,6 +198,12 @@ class Taichi:
         else:
             self._compiled.add(call)
             kernel(*parts)
+
+    def repeat(self, going: wp.array, body: Callable[[], None]) -> None:
+        self.wait()
+        while going.numpy()[0]:
+            body()
+            self.wait()
 
     def prepare(self, solver: Any) -> None:
         """Taichi compiles a kernel when it is called: one substep of an empty pool calls them all. What the pool holds

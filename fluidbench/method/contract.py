@@ -214,6 +214,11 @@ class Method(ABC):
         that picks its own step."""
 
     @classmethod
+    def decided(cls, scenario: Scenario, config: Any) -> Any:
+        """The settings of a run: what is left to the method (`auto`) decided by the scenario."""
+        return config
+
+    @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> Sequence[Economy]:
         """What `ablate` may relax, in the method's own numerics."""
         return ()

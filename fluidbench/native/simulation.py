@@ -340,8 +340,9 @@ class Simulation(Session):
         return found
 
     def statistics(self) -> dict[str, Any]:
-        """Launches of kernels: of a substep, and of the processes a tick, at most."""
-        return {"launches": {"per_substep": self.substep_launches, "process_per_tick": self.process_launches}}
+        """Launches of kernels, of a substep and of the processes a tick, at most; what solves took."""
+        launches = {"per_substep": self.substep_launches, "process_per_tick": self.process_launches}
+        return {"launches": launches, "solves": self.solver.solves()}
 
     def peak_device_bytes(self) -> int | None:
         device = self.scene.device

@@ -88,6 +88,11 @@ class Solver(Method):
         none, or where a method carries it otherwise than by particle."""
         return None
 
+    def solves(self) -> dict[str, float]:
+        """What iterative solves have taken so far: `iterations` a solve, the largest `residual`, the share that is
+        `unconverged`; empty where nothing is solved for."""
+        return {}
+
     def traffic(self) -> dict[str, float] | None:
         """Bytes of a substep beside the pool's, see Session.traffic."""
         return None

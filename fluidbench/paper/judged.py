@@ -173,14 +173,15 @@ def limits(e: Evidence) -> list[Cell]:
         verdict = placed(ranked(sizes)["mpm"], "highest")
         cells.append(Cell("limits: memory", "mpm", "memory", measured, "compare", "cost", verdict, all_runs(e)))
     cells.append(grid_artifacts(e, "limits: grid artifacts", "grid artifacts"))
-    for name, key, ends, unit in (
-        ("viscosity", "material.viscosity", VISCOSITIES, "Pa s"),
-        ("yield stress", "material.yield_stress", YIELDS, "Pa"),
+    for name, key, ends, unit, more in (
+        ("viscosity, explicit", "material.viscosity", VISCOSITIES, "Pa s", {"numerics.sph.viscosity": "explicit"}),
+        ("viscosity, implicit", "material.viscosity", VISCOSITIES, "Pa s", {"numerics.sph.viscosity": "implicit"}),
+        ("yield stress", "material.yield_stress", YIELDS, "Pa", {}),
     ):
-        first, last = (bound_dt(e.scenario, "sph", {key: value}) for value in ends)
+        first, last = (bound_dt(e.scenario, "sph", {key: value} | more) for value in ends)
         verdict = CONFIRMED if first / last >= COLLAPSE else REFUTED
         measured = f"dt {first:.3g} s at {ends[0]:g} {unit}, {last:.3g} s at {ends[1]:g}: {first / last:.3g}-fold"
-        word = "high viscosity" if name == "viscosity" else "non-Newtonian"
+        word = "non-Newtonian" if name == "yield stress" else "high viscosity"
         cells.append(Cell(f"limits: {name}", "sph", word, measured, "bounds", "collapse", verdict))
     return [*cells, physical_accuracy(e)]
 

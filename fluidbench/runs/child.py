@@ -66,14 +66,15 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     write_npz(folder / FINAL_FRAME, frame)
     frames = [frame_name(i) for i in range(len(rows))] if job.keep_frames else []
     found = results(scenario, frame, series) if outcome.verdict is Verdict.COMPLETED else {}
-    warnings = scenario.warnings() + undrawn + found.pop("warnings", [])
+    told = session.statistics()
+    warnings = scenario.warnings() + undrawn + found.pop("warnings", []) + _unconverged(told.get("solves", {}))
     record = Record(
         **heading,
         verdict=outcome.verdict,
         reason=outcome.reason,
         **found,
         cost=cost(outcome, session, time.perf_counter() - start),
-        **session.statistics(),
+        **told,
         bytes=session.footprint(),
         bounds_s={b.name: b.dt for b in session.bounds()},
         binding_s=outcome.binding,
@@ -114,6 +115,13 @@ def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str,
         "print": verdict_of(criteria) if criteria else None,
         "warnings": _numberless(final) + departures(final) + unrest,
     }
+
+
+def _unconverged(solves: dict[str, float]) -> list[str]:
+    if not solves.get("unconverged"):
+        return []
+    share, worst = solves["unconverged"], solves["residual"]
+    return [f"{share:.2g} of its viscous solves ended too early, with residuals up to {worst:.2g} of the velocity"]
 
 
 def _numberless(measures: dict[str, float]) -> list[str]:

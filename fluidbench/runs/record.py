@@ -82,6 +82,7 @@ class Record(BaseModel):
     print: Print | None = None  # what became of it
     cost: Cost | None = None
     launches: dict[str, float] = {}
+    solves: dict[str, float] = {}  # what iterative solves took, see native/solver.py
     bytes: dict[str, int] = {}
     bounds_s: dict[str, float] = {}
     binding_s: dict[str, float] = {}  # simulated time that each bound held the step back

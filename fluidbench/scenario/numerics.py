@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 
 
 def configure(method: type[Method], scenario: Scenario) -> Any:
-    """The method's Config with the scenario's `numerics` section applied; raises UserError for unknown keys."""
+    """The method's Config with the scenario's `numerics` section applied, and decided; raises UserError for unknown
+    keys."""
     given = scenario.numerics.get(method.name, {})
     try:
-        return method.Config(**given)
+        return method.decided(scenario, method.Config(**given))
     except ValidationError as error:
         item = error.errors()[0]
         key = ".".join(str(part) for part in item["loc"])

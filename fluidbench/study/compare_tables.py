@@ -106,6 +106,9 @@ def costs(results: Sequence[Run]) -> Table:
             g if key != "bytes_per_particle" or any(c.bytes_per_particle for c in g) else [] for g in groups.values()
         ]
         table.rows.append([label(key), *[spread([getattr(c, key) for c in g]) if g else "-" for g in known]])
+    for key in dict.fromkeys(key for g in sound.values() for r in g for key in r.solves):
+        known = [[r.solves[key] for r in g if key in r.solves] for g in sound.values()]
+        table.rows.append([f"viscous solve: {key}", *[spread(values) if values else "-" for values in known]])
     table.rows.append(["binding bound", *[g[0].binding or "-" if g else "-" for g in sound.values()]])
     return table
 

@@ -48,7 +48,6 @@ from .kernels_warp import FARTHEST, HURRIED, MOVING, PLACE, PULLING, PUSH, SLACK
 kernel = taichi_func(poly6)
 summed = taichi_func(spiky)
 gradient = taichi_func(spiky_slope)
-smoothing_weight = taichi_func(laws.smoothing_weight, laws.largest_viscosity)
 conveyed_modulus = taichi_func(laws.conveyed_modulus, laws.largest_modulus)
 NumbersT = struct_of(Numbers)
 place_of, push_of, moving_of, pulling_of = (reader(n) for n in (PLACE, PUSH, MOVING, PULLING))
@@ -216,6 +215,25 @@ def velocities(capacity: int, count: Ints, dt: Floats, held: Ints, motion: Vecto
 
 
 @ti.kernel
+def follow(
+    num: NumbersT,
+    box: BoxT,
+    capacity: int,
+    count: Ints,
+    dt: Floats,
+    held: Ints,
+    velocity: Vectors,
+    motion: Vectors,
+    position: Vectors,
+):
+    for i in range(velocity.shape[0]):
+        world = i // capacity
+        if i - world * capacity < count[world] and held[i] == FREE:
+            free = position[i] + (dt[world] * velocity[i] - motion[i])
+            position[i] = contained(box, free, WALL_INSET * num.spacing)
+
+
+@ti.kernel
 def pack(capacity: int, count: Ints, position: Vectors, volume: Floats, velocity: Vectors, moving: Quads):
     for i in range(position.shape[0]):
         if i % capacity < count[i // capacity]:
@@ -346,53 +364,6 @@ def pull(
 
 
 @ti.func
-def shear_pair(num, own, begun, other, r):
-    w = other[3] * num.weight * kernel(r.norm_sqr(), num.support)
-    difference = w * (vector_at(other, 4) - vector_at(own, 4))
-    return vec4(difference[0], difference[1], difference[2], w)
-
-
-sheared_by = over_pairs(MOVING, 4, shear_pair, moving_seen)
-
-
-@ti.kernel
-def shear(
-    num: NumbersT,
-    box: BoxT,
-    lists: ListsT,
-    entries: Ints,
-    number: Ints,
-    inside: Ints,
-    capacity: int,
-    count: Ints,
-    rows: Quads,
-    dt: Floats,
-    phases: Phases,
-    phase_of: Ints,
-    held: Ints,
-    mass: Floats,
-    volume: Floats,
-    elastic_normal: Vectors,
-    elastic_shear: Vectors,
-    pulling: Quads,
-    smoothed: Vectors,
-):
-    for i in range(held.shape[0]):
-        world = i // capacity
-        if i - world * capacity < count[world]:
-            own = moving_of(rows, i)
-            v = vector_at(own, 4)
-            if held[i] == FREE:
-                sums = sheared_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
-                total = sums[3] + own[3] * num.weight * kernel(0.0, num.support)
-                viscosity = phase_at(phases, world, phase_of[i]).viscosity
-                rest = rest_density(mass, volume, i)
-                c = smoothing_weight(viscosity, rest, dt[world], num.support, ti.cast(num.sweeps, ti.f32))
-                v += c / ti.max(total, 1.0) * vector_at(sums, 0)
-            smoothed[i] = v
-
-
-@ti.func
 def wall_friction_acts(kind, gap, spacing, solid):
     """Whether a particle this far from a face feels its friction."""
     return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
@@ -443,10 +414,10 @@ PASSES = SimpleNamespace(
     correct=correct,
     apply=apply,
     velocities=velocities,
+    follow=follow,
     pack=pack,
     settle=settle,
     strain=strain,
     pull=pull,
-    shear=shear,
     wall_friction=wall_friction,
 )

@@ -3,7 +3,7 @@
 One substep: predict, lists, then per iteration multipliers and correction, then velocity from the change of position.
 Shear strength of what flows is a compliant constraint (XPBD, Macklin et al. 2016) whose multiplier is bounded by the
 yield stress: one Jacobi step a substep, `strain` and `pull`. Solids are held by bonds instead (bonds.py). Newtonian
-viscosity is mapped onto velocity smoothing (laws.smoothing_weight). Sums over pairs are those of pairs.py.
+viscosity is implicit (../viscosity.py). Sums over pairs are those of pairs.py.
 """
 
 import functools
@@ -33,7 +33,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 kernel = warp_func(poly6)
 summed = warp_func(spiky)
 gradient = warp_func(spiky_slope)
-smoothing_weight = warp_func(laws.smoothing_weight, laws.largest_viscosity)
 conveyed_modulus = warp_func(laws.conveyed_modulus, laws.largest_modulus)
 
 SLACK = wp.constant(
@@ -53,7 +52,6 @@ class Numbers:
     weight: float  # makes the density sum exactly 1 on a lattice at rest [-]
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
-    sweeps: int  # shear sweeps per substep
     calm: float  # share of the approach of neighbours that is damped in a substep, in pastes [-]
     stiffness: float  # largest shear modulus that one Jacobi step conveys, over rho (d / dt)^2 [-]
 
@@ -216,6 +214,29 @@ def velocities(
 
 
 @wp.kernel
+def follow(
+    share: wp.vec3i,
+    num: Numbers,
+    box: Box,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    held: wp.array(dtype=int),
+    velocity: wp.array(dtype=wp.vec3),
+    motion: wp.array(dtype=wp.vec3),
+    # outputs
+    position: wp.array(dtype=wp.vec3),
+):
+    """Matter goes where its velocity takes it after viscosity has acted, which holds back what gravity and constraints
+    would move in a substep, too."""
+    i = index_of(share, wp.tid())
+    world = i / capacity
+    if i - world * capacity < count[world] and held[i] == FREE:
+        free = position[i] + (dt[world] * velocity[i] - motion[i])
+        position[i] = contained(box, free, WALL_INSET * num.spacing)
+
+
+@wp.kernel
 def pack(
     share: wp.vec3i,
     capacity: int,
@@ -368,28 +389,6 @@ pull = Pass(Numbers, Shearing, PULLING, 6, pull_pair, pull_finish, seen=seen_pul
 3."""
 
 
-@wp.func
-def shear_pair(num: Numbers, own: floats(MOVING + 4), other: floats(MOVING), r: wp.vec3):
-    w = other[3] * num.weight * kernel(wp.dot(r, r), num.support)
-    return wp.vec4(w * (other[4] - own[4]), w * (other[5] - own[5]), w * (other[6] - own[6]), w)
-
-
-@wp.func
-def shear_finish(num: Numbers, box: Box, data: Shearing, world: int, i: int, own: floats(MOVING + 4), sums: wp.vec4):
-    v = wp.vec3(own[4], own[5], own[6])
-    if data.held[i] == FREE:
-        total = sums[3] + own[3] * num.weight * kernel(0.0, num.support)
-        viscosity = data.phases[world, data.phase_of[i]].viscosity
-        rest = rest_density(data.mass, data.volume, i)
-        c = smoothing_weight(viscosity, rest, data.dt[world], num.support, float(num.sweeps))
-        v += (c / wp.max(total, 1.0)) * wp.vec3(sums[0], sums[1], sums[2])
-    data.smoothed[i] = v
-
-
-shear = Pass(Numbers, Shearing, MOVING, 4, shear_pair, shear_finish, seen=seen_moving)
-"""One XSPH sweep (eq. 17). Sums: weighted differences of velocity (3), weights."""
-
-
 @functools.cache
 def passes(cpu: bool) -> SimpleNamespace:
     """The passes for one kind of device."""
@@ -398,12 +397,12 @@ def passes(cpu: bool) -> SimpleNamespace:
         "correct": correct,
         "strain": strain,
         "pull": pull,
-        "shear": shear,
     }
     return SimpleNamespace(
         predict=predict,
         apply=apply,
         velocities=velocities,
+        follow=follow,
         pack=pack,
         settle=settle,
         wall_friction=wall_friction,

@@ -1,16 +1,6 @@
 """What position-based dynamics makes of material parameters at a given time step, as plain laws (see bind.py)."""
 
 
-def largest_viscosity(density: float, dt: float, support: float, sweeps: float):
-    """The most that XSPH sweeps can stand for at this dt [Pa s]: rho sweeps H^2 / (22 dt) (references.md, C)."""
-    return density * sweeps * support * support / (22.0 * dt)
-
-
-def smoothing_weight(viscosity: float, density: float, dt: float, support: float, sweeps: float):
-    """XSPH coefficient of one sweep that acts like a viscosity [Pa s]: its share of the largest, at most 1."""
-    return min(viscosity / largest_viscosity(density, dt, support, sweeps), 1.0)
-
-
 def largest_modulus(share: float, density: float, spacing: float, dt: float):
     """The most that a substep conveys [Pa]: share rho (d / dt)^2."""
     return density * share * spacing * spacing / (dt * dt)

@@ -24,6 +24,7 @@ from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
 from ..smoothing import spiky
+from ..viscosity import ImplicitViscosity, Tolerance, accuracy, carried_by, footprint_of
 from . import bonds, laws
 from . import kernels_warp as kernels
 from .network import Network
@@ -35,7 +36,7 @@ class ConfigPBD(Config):
     advance: Annotated[float, Field(gt=0, le=1)] = Field(0.125, description="accuracy: spacings moved per substep")
     relaxation: Annotated[float, Field(gt=0)] = Field(0.2, description="constraint force mixing epsilon")
     over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
-    shear_sweeps: Annotated[int, Field(ge=1, le=64)] = Field(8, description="XSPH sweeps per substep")
+    viscous_tolerance: Tolerance = 1e-4
     shear_stiffness: Annotated[float, Field(gt=0, le=2)] = Field(
         0.5, description="largest shear modulus that a substep conveys, over rho (d / dt)^2"
     )
@@ -44,17 +45,11 @@ class ConfigPBD(Config):
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
 
-def largest_viscosity(scenario: Scenario, config: ConfigPBD, dt: float) -> float:
-    """The most viscosity that a scenario's sweeps can stand for at this dt [Pa s]."""
-    support = config.support_ratio * scenario.spacing
-    return laws.largest_viscosity(scenario.material.density, dt, support, config.shear_sweeps)
-
-
 STIFFEST = 0.5  # kappa in c_eff = kappa (d / dt) sqrt(sweeps), Jacobi (references.md, I)
 
 
 class SolverPBD(Solver):
-    """Position-based fluids: one-sided density constraints, compliant shear bounded by yield, bonds, XSPH viscosity."""
+    """Position-based fluids: one-sided density constraints, compliant shear bounded by yield, bonds, viscosity."""
 
     name = "pbd"
     rank = 3
@@ -79,9 +74,10 @@ class SolverPBD(Solver):
         "pack",
         "strain",
         "pull",
-        "shear",
         "settle",
+        "drag",
         "wall_friction",
+        "follow",
     )
 
     typical_rate, typical_bytes = 2.5e5, 900.0
@@ -89,12 +85,11 @@ class SolverPBD(Solver):
 
     @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
-        found = [
+        return [
             Economy("fewer iterations", {"iterations": max(1, config.iterations // 2)}),
             Economy("larger dt", {"advance": min(2.0 * config.advance, 1.0)}),
             Economy("fewer neighbours", {"support_ratio": 2.0}),
         ]
-        return [*found, *([Economy("fewer sweeps", {"shear_sweeps": 4})] if scenario.material.viscosity > 0 else [])]
 
     @classmethod
     def usual_dt(cls, scenario: Scenario, config: Any) -> float:
@@ -120,9 +115,6 @@ class SolverPBD(Solver):
     def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
         m, words = scenario.material, []
         dt = cls.usual_dt(scenario, config)
-        most = largest_viscosity(scenario, config, dt)
-        if m.viscosity > most:
-            words.append(f"viscosity {m.viscosity:g} Pa s acts like at most {most:.3g} Pa s (XSPH at this dt)")
         if m.is_solid:
             words.append("Poisson ratio 1/4: bonds are central forces")
             stiffest = STIFFEST**2 * config.bond_sweeps * m.density * (scenario.spacing / dt) ** 2
@@ -145,6 +137,8 @@ class SolverPBD(Solver):
         limits = [Bound("accuracy", a * d / max(speed, 1e-12), f"{a:g} d / v", "references.md, H: no stability bound")]
         if g > 0:
             limits.append(Bound("free fall", (a * d / g) ** 0.5, f"sqrt({a:g} d / |g|)", "same, from rest"))
+        if scenario.material.viscosity > 0:
+            limits.append(accuracy(scenario))
         return limits
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
@@ -156,7 +150,6 @@ class SolverPBD(Solver):
         self.num.spacing = scene.spacing
         self.num.weight = 1.0 / _lattice_sum(config.support_ratio)
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
-        self.num.sweeps = config.shear_sweeps
         kinds = (*scene.box.lower_kind, *scene.box.upper_kind)
         self.wall_friction_acts = FRICTION in kinds or (bonds.needed(scene) and STICK in kinds)
         self.num.calm = config.calm
@@ -172,12 +165,16 @@ class SolverPBD(Solver):
             self.fill = wp.ones(pool.size, dtype=float)
             self.places = wp.zeros(pool.size * kernels.PLACE // 4, dtype=wp.vec4)
             self.pushes = wp.zeros(pool.size * kernels.PUSH // 4, dtype=wp.vec4)
-            sheared, pulled = scene.flowing or scene.viscous, scene.flowing
-            self.moving = wp.zeros(pool.size * kernels.MOVING // 4 if sheared else 1, dtype=wp.vec4)
-            self.pulling = wp.zeros(pool.size * kernels.PULLING // 4 if pulled else 1, dtype=wp.vec4)
+            self.moving = wp.zeros(pool.size * kernels.MOVING // 4 if scene.flowing else 1, dtype=wp.vec4)
+            self.pulling = wp.zeros(pool.size * kernels.PULLING // 4 if scene.flowing else 1, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, config.skin * scene.spacing)
         self._bring_together()
         self.order = side_by_side(scene, pool)
+        self.viscosity = None
+        if scene.viscous:
+            support, tolerance = self.num.support, config.viscous_tolerance
+            self.viscosity = ImplicitViscosity(scene, pool, self.backend, self.neighbours, support, tolerance)
+            self.still = wp.zeros(pool.size, dtype=wp.vec3, device=scene.device)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, those of bonds where the scene has any."""
@@ -222,18 +219,16 @@ class SolverPBD(Solver):
             self.correct()
             self.apply()
         self.velocities()
-        if self.scene.flowing or self.scene.viscous:
-            self.pack()
         if self.scene.flowing:
+            self.pack()
             self.strain()
             self.pull()
             self.settle()
-        if self.scene.viscous:
-            for _ in range(self.config.shear_sweeps):
-                self.shear()
-                self.settle()
+        self.drag()
         if self.wall_friction_acts:
             self.wall_friction()
+        if self.scene.viscous:
+            self.follow()
 
     def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
         self.backend.launch(kernel, self.pool.size, inputs, outputs)
@@ -317,8 +312,14 @@ class SolverPBD(Solver):
     def pull(self) -> None:
         self._over_pairs(self.kernels.pull, self.pulling, self.shearing)
 
-    def shear(self) -> None:
-        self._over_pairs(self.kernels.shear, self.moving, self.shearing)
+    def drag(self) -> None:
+        if self.viscosity is not None:
+            self.viscosity.solve(self.still, self.pool.velocity, 1.0)
+
+    def follow(self) -> None:
+        pool, scene = self.pool, self.scene
+        inputs = [self.num, scene.box, *self._active(), scene.dt, pool.held, pool.velocity, self.motion]
+        self._launch(self.kernels.follow, inputs, [pool.position])
 
     def settle(self) -> None:
         self._launch(self.kernels.settle, [*self._active(), self.smoothed], [self.pool.velocity, self.moving])
@@ -350,10 +351,13 @@ class SolverPBD(Solver):
 
     def carried(self) -> dict[str, Any]:
         network = {} if self.network is None else self.network.carried()
-        return {"fill": self.fill, **self.neighbours.carried(), **network}
+        return {"fill": self.fill, **self.neighbours.carried(), **network, **carried_by(self.viscosity)}
 
     def sort_keys(self) -> Any:
         return self.order.keys() if self.network is None else None  # bonds name their partners by slot
+
+    def solves(self) -> dict[str, float]:
+        return {} if self.viscosity is None else self.viscosity.effort()
 
     def densities(self) -> np.ndarray:
         return present_density(self.pool, 1.0 / np.maximum(self.fill.numpy(), 1.0))
@@ -362,13 +366,12 @@ class SolverPBD(Solver):
         """Bonds left out."""
         rows = [kernels.PLACE, kernels.PUSH] * self.config.iterations
         rows += [kernels.MOVING, kernels.PULLING] * self.scene.flowing
-        rows += [kernels.MOVING] * self.config.shear_sweeps * self.scene.viscous
         return self.neighbours.traffic(rows)
 
     def footprint(self) -> dict[str, int]:
         own = ("motion", "correction", "smoothed", "fill", "places", "pushes", "moving", "pulling")
         bytes_of = {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
-        return bytes_of | (self.network.footprint() if self.network else {})
+        return bytes_of | (self.network.footprint() if self.network else {}) | footprint_of(self.viscosity)
 
 
 def _lattice_sum(support_ratio: float) -> float:

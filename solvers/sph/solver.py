@@ -21,13 +21,22 @@ from fluidbench.scenario.material import Material
 from .. import aging
 from ..backends import backend_of
 from ..constitutive import STRETCHED
+from ..lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
 from ..smoothing import wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
+from ..viscosity import (
+    ImplicitViscosity,
+    Scheme,
+    Tolerance,
+    accuracy,
+    carried_by,
+    footprint_of,
+    implicit_is_cheaper,
+)
 from . import kernels_warp as kernels
-from .lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from .particle import Smoothing
 
 NonNegative = Annotated[float, Field(ge=0)]
@@ -42,6 +51,10 @@ class ConfigSPH(Config):
     )
     cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
     viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
+    viscosity: Scheme = Field(
+        "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
+    )
+    viscous_tolerance: Tolerance = 1e-4
     force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
     density_diffusion: NonNegative = Field(0.1, description="delta of delta-SPH")
     artificial_viscosity: NonNegative = Field(0.01, description="alpha for liquids")
@@ -96,7 +109,7 @@ class SolverSPH(Solver):
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     Config: ClassVar = ConfigSPH
-    passes = ("lists", "pack", "strain", "force", "move")
+    passes = ("lists", "pack", "strain", "force", "drag", "move")
     OWN: ClassVar = ("matter", "new_density", "state", "shift", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
@@ -111,6 +124,13 @@ class SolverSPH(Solver):
     }
 
     @classmethod
+    def decided(cls, scenario: Scenario, config: Any) -> Any:
+        if config.viscosity != "auto":
+            return config
+        cheaper = "implicit" if implicit_is_cheaper(cls, scenario, config) else "explicit"
+        return config.model_copy(update={"viscosity": cheaper})
+
+    @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
         key = config.smoothing_key(scenario.material)
         return [
@@ -122,6 +142,8 @@ class SolverSPH(Solver):
     @classmethod
     def theory(cls, scenario: Scenario, config: Any) -> float:
         ratio = config.smoothing(scenario.material)
+        if config.viscosity == "implicit":
+            scenario = scenario.made_of(scenario.material.model_copy(update={"viscosity": 0.0}))
         return stable_dt(cls, scenario, config, *sph_numbers(ratio, config.cfl, config.viscous_number))
 
     @classmethod
@@ -144,7 +166,8 @@ class SolverSPH(Solver):
         h = ratio * scenario.spacing
         # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1); that of the
         # material is scaled to be exact in a lattice, 7 % up at h = 1.3 d.
-        nu = viscous_scale(ratio) * m.viscosity / m.density + config.alpha(m) * h * c / 10.0
+        explicit = 0.0 if config.viscosity == "implicit" else m.viscosity
+        nu = viscous_scale(ratio) * explicit / m.density + config.alpha(m) * h * c / 10.0
         g = scenario.peak_acceleration
         a = config
         shear_speed = math.sqrt(m.shear_modulus / m.density)
@@ -171,11 +194,13 @@ class SolverSPH(Solver):
                 f"{a.force_number:g} sqrt(h / g)",
                 "Monaghan 1992",
             ),
+            *([accuracy(scenario)] if m.viscosity > explicit else []),
         ]
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
+        self.implicit = scene.viscous and config.viscosity == "implicit"
         self.kernels = self.kernels_of(backend)
         self.num = Smoothing()
         ratio = config.smoothing(scene.scenario.material)
@@ -206,10 +231,14 @@ class SolverSPH(Solver):
         self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
         self._bring_together()
         self.order = side_by_side(scene, pool)
+        self.viscosity = None
+        if self.implicit:
+            support, tolerance = 2.0 * self.num.h, config.viscous_tolerance
+            self.viscosity = ImplicitViscosity(scene, pool, self.backend, self.neighbours, support, tolerance)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
-        variant = self.scene.elastic, self.scene.viscous, self.scene.changes
+        variant = self.scene.elastic, self.scene.viscous and not self.implicit, self.scene.changes
         if backend == "taichi":
             from . import kernels_taichi
 
@@ -297,6 +326,10 @@ class SolverSPH(Solver):
     def force(self) -> None:
         self._over_pairs(self.kernels.force, self.state, self.forcing)
 
+    def drag(self) -> None:
+        if self.viscosity is not None:
+            self.viscosity.solve(self.acceleration, self.acceleration, 0.0)
+
     def move(self) -> None:
         pool, scene = self.pool, self.scene
         self.backend.launch(
@@ -329,10 +362,13 @@ class SolverSPH(Solver):
         self.backend.prepare(self)
 
     def carried(self) -> dict[str, Any]:
-        return self.neighbours.carried()
+        return self.neighbours.carried() | carried_by(self.viscosity)
 
     def sort_keys(self) -> Any:
         return self.order.keys()
+
+    def solves(self) -> dict[str, float]:
+        return {} if self.viscosity is None else self.viscosity.effort()
 
     def densities(self) -> np.ndarray:
         return self.pool.density.numpy()
@@ -348,4 +384,4 @@ class SolverSPH(Solver):
 
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}
-        return own | self.neighbours.footprint()
+        return own | self.neighbours.footprint() | footprint_of(self.viscosity)

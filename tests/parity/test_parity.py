@@ -68,6 +68,7 @@ def tank(material, walls=WALLS, depth=0.08, **more):
 CASES = {
     "liquid": tank({"density": 1000.0}),
     "viscous": tank({"density": 1000.0, "viscosity": 2.0, "equation_of_state": "tait"}, CLOSED),
+    "thick": tank({"density": 1000.0, "viscosity": 50.0}, CLOSED, numerics={"sph": {"viscosity": "implicit"}}),
     "paste": tank(PASTE),
     "viscous paste": tank(PASTE | {"viscosity": 1.0, "flow_index": 1.0}, CLOSED),
     "viscoelastic": tank(

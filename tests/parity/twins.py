@@ -163,8 +163,8 @@ class Twins:
         if self.method == "pbd":
             skipped |= set() if network is not None else {"bind", "stretch"}
             skipped |= set() if scene.flowing else {"strain", "pull"}
-            skipped |= set() if scene.viscous else {"shear"}
-            skipped |= set() if scene.viscous or scene.flowing else {"pack", "settle"}
+            skipped |= set() if scene.flowing else {"pack", "settle"}
+            skipped |= set() if scene.viscous else {"follow"}
         for name in self.warp.solver.passes:
             if name not in skipped:
                 yield name, lambda solver, name=name: getattr(solver, name)()

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from fluidbench.method.timestep import Bound, damped_limit, lost_speed, plan
 from fluidbench.registry import get_method
-from solvers.sph.lattice import hourglass_limit
+from solvers.lattice import hourglass_limit
 
 from ..conftest import scenario
 

@@ -100,12 +100,10 @@ def test_pbd_refuses_yield_stresses_that_no_substep_conveys():
     assert refusal("pbd", moving(1.0, youngs_modulus=1e4)) is None and refusal("pbd", moving(1.0)) is None
 
 
-def test_pbd_says_how_much_of_a_viscosity_and_of_a_stiffness_is_lost():
-    """rho 8 H^2 / (22 dt) with H = 24 mm is 167.6 Pa s; G = 32 kPa acts in series with the 32 kPa of a substep."""
+def test_pbd_says_how_much_of_a_stiffness_is_lost():
+    """G = 32 kPa acts in series with the 32 kPa of a substep; all of a viscosity acts."""
     solver = get_method("pbd")
-    thick = solver.approximates(moving(1.0, viscosity=170.0), solver.Config())
-    assert any("viscosity 170 Pa s acts like at most 168 Pa s" in words for words in thick)
-    assert len(solver.approximates(moving(1.0, viscosity=167.0), solver.Config())) == 1
+    assert len(solver.approximates(moving(1.0, viscosity=1e9), solver.Config())) == 1
     paste = {"poisson_ratio": 0.25, "yield_stress": 10.0}
     stiff = solver.approximates(moving(1.0, youngs_modulus=8e4, **paste), solver.Config())
     assert any("shear modulus 3.2e+04 Pa acts like 1.6e+04 Pa" in words for words in stiff)

@@ -12,9 +12,9 @@ from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import define
 from solvers.flow import shear_rate
+from solvers.lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from solvers.smoothing import wendland, wendland_slope
 from solvers.sph import particle
-from solvers.sph.lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from solvers.sph.solver import crowding
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}

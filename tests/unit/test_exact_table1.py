@@ -167,17 +167,23 @@ def test_a_step_collapses_when_it_shrinks_tenfold(monkeypatch):
 
     def steps(scenario, method, settings):
         seen.append((method, *settings.items()))
+        if settings.get("numerics.sph.viscosity") == "implicit":
+            return 20.0
         return {1e-3: 20.0, 1e3: 2.0, 0.0: 19.98, 1e4: 2.0}[next(iter(settings.values()))]
 
     monkeypatch.setattr(module, "bound_dt", steps)
     cells = {c.row: c for c in limits(evidence())}
-    assert cells["limits: viscosity"].verdict == CONFIRMED and cells["limits: yield stress"].verdict == REFUTED
-    assert cells["limits: viscosity"].measured == "dt 20 s at 0.001 Pa s, 2 s at 1000: 10-fold"
+    assert cells["limits: viscosity, explicit"].verdict == CONFIRMED
+    assert cells["limits: viscosity, implicit"].verdict == cells["limits: yield stress"].verdict == REFUTED
+    assert cells["limits: viscosity, explicit"].measured == "dt 20 s at 0.001 Pa s, 2 s at 1000: 10-fold"
     assert cells["limits: yield stress"].measured == "dt 20 s at 0 Pa, 2 s at 10000: 9.99-fold"
-    assert [c.paper for c in cells.values() if c.rule == "collapse"] == ["high viscosity", "non-Newtonian"]
+    assert [c.paper for c in cells.values() if c.rule == "collapse"] == ["high viscosity"] * 2 + ["non-Newtonian"]
     assert seen == [
-        ("sph", ("material.viscosity", 1e-3)),
-        ("sph", ("material.viscosity", 1e3)),
+        *(
+            ("sph", ("material.viscosity", value), ("numerics.sph.viscosity", scheme))
+            for scheme in ("explicit", "implicit")
+            for value in (1e-3, 1e3)
+        ),
         ("sph", ("material.yield_stress", 0.0)),
         ("sph", ("material.yield_stress", 1e4)),
     ]
@@ -187,10 +193,9 @@ def test_a_bound_is_the_least_of_the_varied_scenario():
     """A thousand Pa s in paste of 6 kPa: the viscous limit of SPH, with nu = 1 m^2/s and a little of its own."""
     h, c = 1.3 * BEAD.spacing, BEAD.wave_speed
     wanted = 0.09 * h**2 / (1.0729193 + 1.0 * h * c / 10.0)
-    assert bound_dt(BEAD, "sph", {"material.viscosity": 1e3}) == pytest.approx(wanted)
-    assert bound_dt(BEAD, "sph", {"material.viscosity": 1e3, "numerics.sph.viscous_number": 0.045}) == pytest.approx(
-        wanted / 2
-    )
+    thick = {"material.viscosity": 1e3, "numerics.sph.viscosity": "explicit"}
+    assert bound_dt(BEAD, "sph", thick) == pytest.approx(wanted)
+    assert bound_dt(BEAD, "sph", thick | {"numerics.sph.viscous_number": 0.045}) == pytest.approx(wanted / 2)
 
 
 def test_the_table_has_every_cell_and_says_nothing_where_nothing_ran():

@@ -7,7 +7,7 @@ import numpy as np
 
 from fluidbench.method.timestep import damped_limit
 
-from ..smoothing import wendland_slope
+from .smoothing import wendland_slope
 
 
 def lattice(ratio: float) -> tuple[np.ndarray, np.ndarray]:

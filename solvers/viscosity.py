@@ -1,0 +1,170 @@
+"""Viscosity implicit in time, for SPH and PBD: backward Euler on pairs, by conjugate gradients.
+
+The velocity v at the end of a step solves K v = v*, with v* what everything else makes of it, and
+
+    (K v)_i = v_i + dt sum_j m_j w(r) (5 mu_ij / (rho_i rho_j)) (r (r . u) + s (s . u)) / r^2,    u = v_i - v_j:
+
+the viscosity of Monaghan & Gingold (1983) after Weiler et al. (2018, Comput. Graph. Forum 37:145), with a weight w that
+is isotropic on a lattice (smoothing.drag_weight). s is r; only an image in a no-slip wall has it mirrored: with r alone
+what i does to the image of j is not what j does to that of i, and conjugate gradients need that it is. The two differ
+where a flow turns into the wall, and not in a shear.
+
+The mass is the preconditioner: every direction is then a sum of forces between pairs, so momentum and angular momentum
+stay whatever the residual. The viscous acceleration of the step before is the first guess. Iterations end when the
+root mean square of v* - K v, weighed by mass, is `tolerance` times that of v*; all that decides it stays on the device.
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import warp as wp
+from pydantic import Field
+
+from fluidbench.method.timestep import Bound
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import Scene
+from fluidbench.scenario import Scenario
+
+from . import viscosity_warp as kernels
+from .backends import Backend
+
+Scheme = Literal["auto", "explicit", "implicit"]
+Tolerance = Annotated[float, Field(gt=0, le=1e-2, description="residual of implicit viscosity, over the velocity")]
+WORTH = 6.0  # times the substeps that explicit viscosity may take before implicit is cheaper
+RESOLVED, OVER = 0.1, 1e-3  # of the slowest viscous decay, and of the run, that a step may take
+MOST = 400  # iterations of one solve: a thousandfold of the explicit step takes some hundred
+
+
+def implicit_is_cheaper(method: Any, scenario: Scenario, config: Any) -> bool:
+    """Whether the bounds of the most viscous matter of a run say that implicit viscosity is cheaper."""
+    thickest = max(scenario.aged[1], key=lambda m: m.viscosity)
+    if thickest.viscosity == 0.0:
+        return False
+    made = scenario.made_of(thickest)
+    steps = []
+    for scheme in ("explicit", "implicit"):
+        bounds = method.bounds(made, config.model_copy(update={"viscosity": scheme}), made.reference_speed)
+        steps.append(min(made.schedule[0], *(b.dt for b in bounds)))
+    return bool(steps[0] * WORTH < steps[1])
+
+
+def accuracy(scenario: Scenario) -> Bound:
+    """What takes the place of the viscous bound: backward Euler is stable at any step, and exact to first order. The
+    slowest shear flow of what the domain can hold, which decays at nu (pi / L)^2, is resolved by ten steps, or over in
+    a part of the run that nobody looks at."""
+    m, domain = scenario.material, scenario.domain
+    size = float(min(np.subtract(domain.upper, domain.lower)))
+    slowest = (size / math.pi) ** 2 * m.density / m.viscosity
+    return Bound(
+        "viscous accuracy",
+        max(RESOLVED * slowest, OVER * scenario.duration),
+        f"{RESOLVED:g} L^2 / (pi^2 nu), or {OVER:g} of the duration",
+        "backward Euler, first order in time",
+    )
+
+
+def carried_by(viscosity: ImplicitViscosity | None) -> dict[str, wp.array]:
+    """What a checkpoint must hold of it."""
+    return {} if viscosity is None else {"counted": viscosity.counted, "worst": viscosity.worst}
+
+
+def footprint_of(viscosity: ImplicitViscosity | None) -> dict[str, int]:
+    """Bytes that it takes beside the pool."""
+    return {} if viscosity is None else {f"viscous_{name}": getattr(viscosity, name).capacity for name in viscosity.OWN}
+
+
+class ImplicitViscosity:
+    """What solves for the velocity of a pool under its viscosity; one a solver, everything allocated at once."""
+
+    OWN = ("rows", "aim", "trial", "image", "residual", "partial")
+
+    def __init__(
+        self, scene: Scene, pool: Pool, backend: Backend, neighbours: Any, support: float, tolerance: float
+    ) -> None:
+        """`neighbours` hold pairs within the `support` [m]; `tolerance` is of the residual over v* [-]."""
+        self.scene, self.pool, self.backend, self.neighbours = scene, pool, backend, neighbours
+        self.kernels = self.kernels_of(backend.name)
+        self.num = kernels.Viscous()
+        self.num.support, self.num.tolerance, self.num.most = support, tolerance, MOST
+        self.drag = pool.add_field("drag", wp.vec3)
+        worlds = len(scene.scenarios)
+        self.chunks = pool.capacity // kernels.CHUNK
+        self.team = 1 if scene.device.is_cpu else kernels.TEAM
+        with wp.ScopedDevice(scene.device):
+            self.rows = wp.zeros(pool.size * kernels.DIRECTION // 4, dtype=wp.vec4)
+            self.aim, self.trial, self.image, self.residual = (wp.zeros(pool.size, dtype=wp.vec3) for _ in range(4))
+            self.partial = wp.zeros(worlds * self.chunks, dtype=wp.vec2)
+            self.totals = wp.zeros(worlds, dtype=kernels.Totals)
+            self.going = wp.zeros(1, dtype=int)
+            self.counted, self.worst = wp.zeros((worlds, 3), dtype=int), wp.zeros(worlds, dtype=float)
+        self.applying = kernels.Applying()
+        self.applying.dt, self.applying.held, self.applying.image = scene.dt, pool.held, self.image
+
+    def kernels_of(self, backend: str) -> SimpleNamespace:
+        if backend == "taichi":
+            from . import viscosity_taichi
+
+            return viscosity_taichi.PASSES
+        return kernels.passes(self.scene.device.is_cpu)
+
+    def solve(self, acceleration: wp.array, target: wp.array, duration: float) -> None:
+        """Enqueue: v from v* = velocity + dt acceleration; (v - v*) / dt is added to `target`, accelerations (duration
+        0), or dt times that to it, velocities (duration 1)."""
+        pool, scene = self.pool, self.scene
+        matter = [pool.position, pool.velocity, acceleration, pool.mass, pool.volume, self.drag]
+        common = [scene.dt, scene.phases, pool.phase, pool.held]
+        self._particles("open_solve", [*common, *matter], [self.aim, self.trial, self.rows])
+        self._apply()
+        inputs = [pool.held, pool.mass, self.aim, self.image]
+        self._particles("residual_of", inputs, [self.residual, self.rows, self.partial], self.chunks)
+        self._weigh("weigh_start")
+        self.backend.repeat(self.going, self._iterate)
+        self._launch("note", len(scene.scenarios), [self.num, self.totals], [self.going, self.counted, self.worst])
+        ends = [scene.dt, pool.held, self.aim, self.trial, float(duration)]
+        self._particles("close_solve", ends, [self.drag, target])
+
+    def _iterate(self) -> None:
+        """One step of conjugate gradients."""
+        mass, search = self.pool.mass, [self.rows, self.image]
+        self._apply()
+        self._particles("along", [mass, *search], [self.partial], self.chunks)
+        self._weigh("weigh_step")
+        moved = [self.trial, self.residual, self.partial]
+        self._particles("descend", [mass, *search, self.totals], moved, self.chunks)
+        self._weigh("weigh_turn")
+        self._particles("turn", [self.totals, self.residual], [self.rows])
+
+    def _apply(self) -> None:
+        """The image K p of the direction p."""
+        lists, pool = self.neighbours, self.pool
+        common = [self.num, self.scene.box, lists.lists, pool.capacity, pool.count]
+        self._launch("image", lists.work, [*common, self.rows, self.applying], [])
+
+    def _particles(self, name: str, inputs: list[Any], outputs: list[Any], chunks: int = 0) -> None:
+        """By particle, or by chunks of them."""
+        pool = self.pool
+        size = len(self.scene.scenarios) * chunks or pool.size
+        self._launch(name, size, [pool.capacity, pool.count, *inputs], outputs)
+
+    def _weigh(self, name: str) -> None:
+        size = len(self.scene.scenarios) * self.team
+        self._launch(name, size, [self.num, self.chunks, self.team, self.partial], [self.totals, self.going])
+
+    def _launch(self, name: str, size: int, inputs: list[Any], outputs: list[Any]) -> None:
+        self.backend.launch(getattr(self.kernels, name), size, inputs, outputs)
+
+    def effort(self, world: int = 0) -> dict[str, float]:
+        """Iterations a solve, largest residual over v*, share of solves that did not converge; nothing before the
+        first."""
+        solves, iterations, unconverged = (int(n) for n in self.counted.numpy()[world])
+        if not solves:
+            return {}
+        return {
+            "iterations": iterations / solves,
+            "residual": float(self.worst.numpy()[world]),
+            "unconverged": unconverged / solves,
+        }

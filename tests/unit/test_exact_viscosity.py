@@ -1,0 +1,206 @@
+"""Viscosity implicit in time: the weight of drag, the operator, and what a solve keeps, by hand."""
+
+import math
+
+import numpy as np
+import pytest
+import warp as wp
+from scipy.integrate import quad
+
+from fluidbench.method.target import Target
+from fluidbench.method.timestep import plan
+from fluidbench.native.simulation import Simulation
+from fluidbench.registry import get_method
+from fluidbench.scenario.library import define
+from fluidbench.scenario.numerics import configure
+from solvers.smoothing import drag_weight
+from solvers.viscosity import accuracy
+
+PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
+STUCK = PERIODIC | {"z_lower": "stick", "z_upper": "stick"}
+SLIPPERY = PERIODIC | {"z_lower": "slip", "z_upper": "slip"}
+SIDE = 8
+METHODS = {"sph": {"viscosity": "implicit"}, "pbd": {}}
+
+
+def made(viscosity=100.0, walls=PERIODIC, jitter=0.0, height=SIDE, **more):
+    return define(
+        "block",
+        domain={"lower": [0, 0, 0], "upper": [SIDE, SIDE, height], "walls": walls},
+        material={"density": 1000.0, "viscosity": viscosity, "sound_speed": 10.0},
+        bodies=[{"kind": "box", "center": [SIDE / 2, SIDE / 2, height / 2], "size": [SIDE, SIDE, height]}],
+        gravity=[0.0, 0.0, 0.0],
+        duration=1.0,
+        spacing=1.0,
+        jitter=jitter,
+        **more,
+    )
+
+
+def block(method, scenario, tolerance=1e-6, threads=1):
+    config = get_method(method).Config(viscous_tolerance=tolerance, **METHODS[method])
+    return Simulation(scenario, method, Target("cpu", "warp", threads), config)
+
+
+def solved(simulation, velocity, dt):
+    """Velocities after one viscous solve alone, and how it went."""
+    simulation.prepare()
+    simulation.begin()
+    simulation.kick(np.pad(velocity, ((0, simulation.pool.size - len(velocity)), (0, 0))))
+    simulation.scene.set_dt(dt)
+    solver = simulation.solver
+    solver.lists()
+    still = wp.zeros(simulation.pool.size, dtype=wp.vec3)
+    solver.viscosity.solve(still, simulation.pool.velocity, 1.0)
+    return simulation.pool.velocity.numpy()[: len(velocity)].astype(float), solver.solves()
+
+
+def noise(simulation, seed=0):
+    return np.random.default_rng(seed).normal(0.0, 1.0, (simulation.pool.counts[0], 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("support", [2.4, 2.6, 3.0, 3.6])
+def test_drag_is_isotropic_in_a_lattice(support):
+    axis = np.arange(-4, 5)
+    places = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3).astype(float)
+    r2 = np.maximum((places**2).sum(axis=1), 1e-9)
+    w = np.array([drag_weight(min(math.sqrt(v) / support, 1.0), support) for v in r2])
+    along, across = (w * places[:, 0] ** 4 / r2).sum(), (w * places[:, 0] ** 2 * places[:, 2] ** 2 / r2).sum()
+    assert 5.0 * across == pytest.approx(1.0, abs=0.04) and 2.5 * (along - across) == pytest.approx(1.0, abs=0.05)
+    whole, _ = quad(lambda r: drag_weight(r / support, support) * r**4 * 4.0 * math.pi / 15.0, 0.0, support)
+    assert whole == pytest.approx(0.2, rel=1e-4)  # of x^2 z^2 / r^2 over all directions
+
+
+@pytest.mark.parametrize("walls", [PERIODIC, STUCK, SLIPPERY])
+@pytest.mark.parametrize("method", METHODS)
+def test_the_operator_is_symmetric_whatever_the_walls(method, walls):
+    """x . K y = y . K x of what lies in disorder: conjugate gradients need no more, and no less."""
+    simulation = block(method, made(1e6, walls, jitter=0.3))
+    a, b = noise(simulation, 1), noise(simulation, 2)
+    solved(simulation, a, 1e-2)
+    viscosity, n = simulation.solver.viscosity, len(a)
+    images = []
+    for direction in (a, b):
+        rows = viscosity.rows.numpy().reshape(-1, 3, 4)
+        rows[:n, 1, :3] = direction
+        viscosity.rows.assign(rows.reshape(-1, 4))
+        viscosity._apply()
+        images.append(viscosity.image.numpy()[:n].astype(float))
+    (ka, kb), scale = images, np.abs(images[0] * b).sum()
+    assert (b * ka).sum() == pytest.approx((a * kb).sum(), abs=2e-6 * scale)
+    assert (a * ka).sum() >= (a * a).sum()  # drag only takes
+    assert np.abs(ka - a).max() > 1.0
+
+
+@pytest.mark.parametrize("viscosity", [1e4, 1e6, 1e8])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_solve_keeps_momentum_and_angular_momentum(method, viscosity):
+    simulation = block(method, made(viscosity, jitter=0.2), tolerance=1e-3)
+    before = noise(simulation)
+    after, went = solved(simulation, before, 1e-2)
+    assert went["iterations"] >= 1 and went["unconverged"] == 0.0 and went["residual"] <= 1e-3
+    assert np.abs(after.sum(axis=0) - before.sum(axis=0)).max() <= 1e-6 * np.abs(before).sum()
+    assert (after**2).sum() < (before.astype(float) ** 2).sum()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_drop_in_free_flight_keeps_its_turn(method):
+    scenario = made(1e6, jitter=0.2)
+    around = scenario.domain.model_copy(update={"lower": (-40.0, -40.0, -40.0), "upper": (40.0, 40.0, 40.0)})
+    scenario = scenario.model_copy(update={"domain": around})
+    simulation = block(method, scenario, tolerance=1e-2)
+    before = noise(simulation)
+    after, _ = solved(simulation, before, 1e-2)
+    x = simulation.frame()["position"].astype(float)
+    turn = [np.cross(x - x.mean(axis=0), v.astype(float)).sum(axis=0) for v in (before, after)]
+    assert np.abs(turn[1] - turn[0]).max() <= 2e-6 * np.abs(np.cross(x - x.mean(axis=0), before)).sum()
+    spin = np.cross([0.0, 0.0, 1.0], x - x.mean(axis=0)).astype(np.float32)
+    kept, went = solved(block(method, scenario), spin, 1e-2)  # a rotation feels no drag
+    assert kept == pytest.approx(spin, abs=1e-4) and went["iterations"] <= 3
+
+
+@pytest.mark.parametrize("reach", [0.1, 10.0, 1000.0])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_shear_wave_falls_as_backward_euler_says(method, reach):
+    """By 1 / (1 + nu k^2 dt) in a step, however long."""
+    height, dt = 32, 1e-2
+    k = 2.0 * math.pi / height
+    scenario = made(1000.0 * reach / (k * k * dt), height=height)
+    simulation = block(method, scenario)
+    z = simulation.frame()["position"][:, 2]
+    before = np.stack([np.sin(k * z), 0 * z, 0 * z], axis=1).astype(np.float32)
+    after, went = solved(simulation, before, dt)
+    left = (after[:, 0] * before[:, 0]).sum() / (before[:, 0] ** 2).sum()
+    assert left * (1.0 + reach) == pytest.approx(1.0, abs=0.04) and went["unconverged"] == 0.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_couette_flow_between_walls_that_stick_is_driven_to_rest(method):
+    simulation = block(method, made(1e6, STUCK))
+    before = np.tile(np.float32([1.0, 0.0, 0.0]), (simulation.pool.counts[0], 1))
+    after, _ = solved(simulation, before, 1.0)
+    assert np.abs(after).max() < 0.02
+    slips, _ = solved(block(method, made(1e6, SLIPPERY)), before, 1.0)
+    assert slips == pytest.approx(before, abs=1e-4)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_worlds_and_threads_change_nothing(method):
+    thick, thin = made(1e4, jitter=0.2), made(1.0, jitter=0.2)
+    alone = block(method, thick)
+    before = noise(alone)
+    expected, went = solved(alone, before, 1e-2)
+    assert (solved(block(method, thick, threads=2), before, 1e-2)[0] == expected).all()
+    both = block(method, [thick, thin])
+    both.prepare()
+    both.begin()
+    both.kick(np.concatenate([np.pad(before, ((0, both.pool.capacity - len(before)), (0, 0)))] * 2))
+    both.scene.set_dt(1e-2)
+    both.solver.lists()
+    still = wp.zeros(both.pool.size, dtype=wp.vec3)
+    both.solver.viscosity.solve(still, both.pool.velocity, 1.0)
+    assert (both.pool.velocity.numpy()[: len(before)] == expected.astype(np.float32)).all()
+    assert both.solver.viscosity.effort(0) == went
+    assert 0 < both.solver.viscosity.effort(1)["iterations"] < went["iterations"]
+
+
+def test_what_is_no_number_ends_the_iterations():
+    simulation = block("sph", made(1e6))
+    before = noise(simulation)
+    before[3] = np.nan
+    _, went = solved(simulation, before, 1e-2)
+    assert went["iterations"] <= 1
+
+
+def test_a_solve_that_may_not_go_on_says_so():
+    simulation = block("sph", made(1e7), tolerance=1e-6)
+    simulation.solver.viscosity.num.most = 3
+    _, went = solved(simulation, noise(simulation), 1e-2)
+    assert went["iterations"] == 3 and went["unconverged"] == 1.0 and went["residual"] > 1e-6
+
+
+def test_nothing_is_solved_where_nothing_moves():
+    simulation = block("pbd", made())
+    after, went = solved(simulation, 0 * noise(simulation), 1e-2)
+    assert not after.any() and went == {"iterations": 0.0, "residual": 0.0, "unconverged": 0.0}
+
+
+@pytest.mark.parametrize(("viscosity", "implicit"), [(0.0, False), (1.0, False), (1e7, True)])
+def test_auto_takes_what_the_bounds_call_cheaper(viscosity, implicit):
+    sph, scenario = get_method("sph"), made(viscosity)
+    config = configure(sph, scenario)
+    assert config.viscosity == ("implicit" if implicit else "explicit")
+    for scheme in ("explicit", "implicit"):
+        told = made(viscosity, numerics={"sph": {"viscosity": scheme}})
+        assert configure(sph, told).viscosity == scheme
+    found = {b.name: b.dt for b in sph.bounds(scenario, config, 1.0)}
+    bare = {b.name: b.dt for b in sph.bounds(made(0.0), config, 1.0)}
+    assert ("viscous accuracy" in found) is implicit
+    assert (found["viscous"] == bare["viscous"]) is (implicit or not viscosity)
+
+
+def test_the_bound_of_accuracy_by_hand():
+    """L = 8 m, nu = 0.1: 0.1 * 64 / (pi^2 0.1) = 6.5 s; of a second's run, 1 ms."""
+    assert accuracy(made(100.0)).dt == pytest.approx(0.1 * 64.0 / (math.pi**2 * 0.1))
+    assert accuracy(made(1e9)).dt == pytest.approx(1e-3)
+    assert plan([accuracy(made(1e9))], 0.01).substeps == 10
