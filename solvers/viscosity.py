@@ -111,9 +111,9 @@ class ImplicitViscosity:
             return viscosity_taichi.PASSES
         return kernels.passes(self.scene.device.is_cpu)
 
-    def solve(self, acceleration: wp.array, target: wp.array, duration: float) -> None:
-        """Enqueue: v from v* = velocity + dt acceleration; (v - v*) / dt is added to `target`, accelerations (duration
-        0), or dt times that to it, velocities (duration 1)."""
+    def solve(self, acceleration: wp.array, target: wp.array, impulse: bool) -> None:
+        """Enqueue: v from v* = velocity + dt acceleration. What viscosity adds goes to `target`: the accelerations or,
+        as an impulse, the velocities."""
         pool, scene = self.pool, self.scene
         matter = [pool.position, pool.velocity, acceleration, pool.mass, pool.volume, self.drag]
         common = [scene.dt, scene.phases, pool.phase, pool.held]
@@ -124,7 +124,7 @@ class ImplicitViscosity:
         self._weigh("weigh_start")
         self.backend.repeat(self.going, self._iterate)
         self._launch("note", len(scene.scenarios), [self.num, self.totals], [self.going, self.counted, self.worst])
-        ends = [scene.dt, pool.held, self.aim, self.trial, float(duration)]
+        ends = [scene.dt, pool.held, self.aim, self.trial, int(impulse)]
         self._particles("close_solve", ends, [self.drag, target])
 
     def _iterate(self) -> None:

@@ -190,15 +190,18 @@ def close_solve(
     held: Ints,
     aim: Vectors,
     trial: Vectors,
-    duration: float,
+    impulse: int,
     drag: Vectors,
     target: Vectors,
 ):
     for i in range(held.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world] and held[i] == FREE:
-            drag[i] = (trial[i] - aim[i]) / dt[world]
-            target[i] += (duration * dt[world] + 1.0 - duration) * drag[i]
+            change = trial[i] - aim[i]
+            drag[i] = change / dt[world]
+            if impulse == 0:
+                change /= dt[world]
+            target[i] += change
 
 
 @ti.func

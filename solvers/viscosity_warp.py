@@ -240,18 +240,20 @@ def close_solve(
     held: wp.array(dtype=int),
     aim: wp.array(dtype=wp.vec3),
     trial: wp.array(dtype=wp.vec3),
-    duration: float,
+    impulse: int,
     # outputs
     drag: wp.array(dtype=wp.vec3),
     target: wp.array(dtype=wp.vec3),
 ):
-    """The viscous acceleration, and what it makes of accelerations (duration 0) or of velocities (1)."""
+    """The viscous acceleration, and what it makes of accelerations or, as an impulse, of velocities."""
     i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
-        by = (trial[i] - aim[i]) / dt[world]
-        drag[i] = by
-        target[i] = target[i] + (duration * dt[world] + 1.0 - duration) * by
+        change = trial[i] - aim[i]
+        drag[i] = change / dt[world]
+        if impulse == 0:
+            change = change / dt[world]
+        target[i] = target[i] + change
 
 
 @wp.func

@@ -79,5 +79,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=HEIGHT / 6,
-    exempt={"pbd": "velocity smoothing makes the viscosity depend on dt, and caps it"},
 )

@@ -76,5 +76,4 @@ CASE = Case(
     tolerance=0.05,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "velocity smoothing makes the viscosity depend on dt; exponent and prefactor are reported"},
 )

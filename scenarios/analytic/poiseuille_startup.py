@@ -71,5 +71,4 @@ CASE = Case(
     evaluate=evaluate,
     quick=WIDTH / 20,
     causes={"mpm": "second order, but the channel is only 10 cells across; passes at two thirds of the spacing"},
-    exempt={"pbd": "the viscosity of velocity smoothing is calibrated in bulk, not at walls"},
 )

@@ -58,5 +58,4 @@ CASE = Case(
     fine_tolerance=0.02,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "velocity smoothing cannot reach this viscosity at PBD's time step"},
 )

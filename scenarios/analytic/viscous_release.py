@@ -64,5 +64,4 @@ CASE = Case(
     evaluate=evaluate,
     quick=HEIGHT / 8,
     causes={"mpm": "floor of the theory: at t* = 1 inertia and H0 / R0 = 0.5 put it 2.6 % off, at t* = 5 0.5 %"},
-    exempt={"pbd": "velocity smoothing makes the viscosity depend on dt; the exponent is reported"},
 )

@@ -45,6 +45,8 @@ class ConfigPBD(Config):
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
 
+PRESSED = 100.0  # viscous stress over rho (d / dt)^2: line_bead held at 42 and jammed at 416
+FEATURE = 8.0  # spacings across which matter shears
 STIFFEST = 0.5  # kappa in c_eff = kappa (d / dt) sqrt(sweeps), Jacobi (references.md, I)
 
 
@@ -103,6 +105,13 @@ class SolverPBD(Solver):
         if m.expansion is not None and (reason := crowded(m.expansion)):
             return reason
         most = laws.largest_modulus(config.shear_stiffness, m.density, scenario.spacing, dt)
+        drag = m.viscosity * scenario.reference_speed / (FEATURE * scenario.spacing)
+        if drag > (push := PRESSED * m.density * (scenario.spacing / dt) ** 2):
+            finer = 0.5 * config.advance * math.sqrt(push / drag)
+            return (
+                f"its viscous stress ({drag:.3g} Pa) is too much for what constraints push in a substep (up to "
+                f"{push:.3g} Pa): matter would be pressed together; set numerics.pbd.advance = {finer:.2g} or less"
+            )
         if m.youngs_modulus is None or m.is_solid or m.flow_threshold < most or m.relaxation_time is not None:
             return None
         finer = 0.5 * config.advance * math.sqrt(most / m.flow_threshold)
@@ -314,7 +323,7 @@ class SolverPBD(Solver):
 
     def drag(self) -> None:
         if self.viscosity is not None:
-            self.viscosity.solve(self.still, self.pool.velocity, 1.0)
+            self.viscosity.solve(self.still, self.pool.velocity, impulse=True)
 
     def follow(self) -> None:
         pool, scene = self.pool, self.scene

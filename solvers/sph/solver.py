@@ -328,7 +328,7 @@ class SolverSPH(Solver):
 
     def drag(self) -> None:
         if self.viscosity is not None:
-            self.viscosity.solve(self.acceleration, self.acceleration, 0.0)
+            self.viscosity.solve(self.acceleration, self.acceleration, impulse=False)
 
     def move(self) -> None:
         pool, scene = self.pool, self.scene

@@ -51,7 +51,7 @@ def solved(simulation, velocity, dt):
     solver = simulation.solver
     solver.lists()
     still = wp.zeros(simulation.pool.size, dtype=wp.vec3)
-    solver.viscosity.solve(still, simulation.pool.velocity, 1.0)
+    solver.viscosity.solve(still, simulation.pool.velocity, impulse=True)
     return simulation.pool.velocity.numpy()[: len(velocity)].astype(float), solver.solves()
 
 
@@ -158,7 +158,7 @@ def test_worlds_and_threads_change_nothing(method):
     both.scene.set_dt(1e-2)
     both.solver.lists()
     still = wp.zeros(both.pool.size, dtype=wp.vec3)
-    both.solver.viscosity.solve(still, both.pool.velocity, 1.0)
+    both.solver.viscosity.solve(still, both.pool.velocity, impulse=True)
     assert (both.pool.velocity.numpy()[: len(before)] == expected.astype(np.float32)).all()
     assert both.solver.viscosity.effort(0) == went
     assert 0 < both.solver.viscosity.effort(1)["iterations"] < went["iterations"]
