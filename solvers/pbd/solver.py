@@ -45,7 +45,7 @@ class ConfigPBD(Config):
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
 
-PRESSED = 100.0  # viscous stress over rho (d / dt)^2: line_bead held at 42 and jammed at 416
+PRESSED = 100.0  # viscous stress over rho (d / dt)^2: what held at 42 was jammed at 416
 FEATURE = 8.0  # spacings across which matter shears
 STIFFEST = 0.5  # kappa in c_eff = kappa (d / dt) sqrt(sweeps), Jacobi (references.md, I)
 
