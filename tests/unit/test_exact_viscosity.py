@@ -1,5 +1,6 @@
 """Viscosity implicit in time: the weight of drag, the operator, and what a solve keeps, by hand."""
 
+import copy
 import math
 
 import numpy as np
@@ -170,6 +171,25 @@ def test_what_is_no_number_ends_the_iterations():
     before[3] = np.nan
     _, went = solved(simulation, before, 1e-2)
     assert went["iterations"] <= 1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(method):
+    """The first guess and the counts of a solve are part of the state."""
+    runs = [block(method, made(1e4, jitter=0.2, tick=0.01)) for _ in range(2)]
+    for simulation in runs:
+        simulation.prepare()
+    runs[0].begin()
+    runs[0].kick(np.pad(noise(runs[0]), ((0, runs[0].pool.size - runs[0].pool.counts[0]), (0, 0))) * 0.01)
+    for _ in range(3):
+        runs[0].advance_tick()
+    runs[1].resume(*copy.deepcopy(runs[0].state()))
+    for simulation in runs:
+        for _ in range(3):
+            simulation.advance_tick()
+    frames = [simulation.frame() for simulation in runs]
+    assert all((frames[0][key] == frames[1][key]).all() for key in frames[0])
+    assert runs[0].solver.solves() == runs[1].solver.solves() != {}
 
 
 def test_a_solve_that_may_not_go_on_says_so():
