@@ -53,9 +53,9 @@ def implicit_is_cheaper(method: Any, scenario: Scenario, config: Any) -> bool:
 
 
 def accuracy(scenario: Scenario) -> Bound:
-    """What takes the place of the viscous bound: backward Euler is stable at any step, and exact to first order. A shear
-    flow across the domain's narrowest side L, which decays at nu (pi / L)^2, is resolved by ten steps, or over in a
-    thousandth of the run."""
+    """What takes the place of the viscous bound: backward Euler is stable at any step, and exact to first order. A
+    shear flow across the domain's narrowest side L, which decays at nu (pi / L)^2, is resolved by ten steps, or over in
+    a thousandth of the run."""
     m, domain = scenario.material, scenario.domain
     size = float(min(np.subtract(domain.upper, domain.lower)))
     slowest = (size / math.pi) ** 2 * m.density / m.viscosity
