@@ -105,22 +105,16 @@ def relieve(
 @wp.kernel
 def harden(
     share: wp.vec3i,
-    elastic: int,
     capacity: int,
     count: wp.array(dtype=int),
-    phases: wp.array2d(dtype=Phase),
     due: wp.array(dtype=int),
     # outputs
     phase_of: wp.array(dtype=int),
-    elastic_normal: wp.array(dtype=wp.vec3),
-    elastic_shear: wp.array(dtype=wp.vec3),
 ):
-    """Move particles to the phase they are due, for a method without a pressure law."""
+    """Move particles to the phase they are due, where nothing is elastic and no pressure law holds."""
     i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and due[i] != phase_of[i]:
-        if elastic == 1:
-            relieve(phases[world, phase_of[i]], phases[world, due[i]], i, elastic_normal, elastic_shear)
         phase_of[i] = due[i]
 
 

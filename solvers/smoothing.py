@@ -17,20 +17,14 @@ def wendland_slope(q: float, h: float):
 
 def drag_weight(q: float, support: float):
     """Weight w(r) [1/m^5] of viscous drag between two at r = q support: sum_j V_j w r_a r_b r_c r_d / r^2 is that of an
-    isotropic tensor, 1/5 for xxzz, exactly in the continuum and to 4 % in a cubic lattice, whatever the support from
-    2.4 to 3.6 spacings. (A kernel's own -W' / r weighs the nearest too much: 17 % too little in shear along the axes
-    at 2.4 spacings, 22 % too much across.) Of q^m (1 - q)^n this comes nearest.
+    isotropic tensor, 1/5 for xxzz, in the continuum and to 3.2 % in a cubic lattice, whatever the support from 2.4 to
+    3.6 spacings. (A kernel's own -W' / r weighs the nearest too much: 17 % too little in shear along the axes at 2.4
+    spacings, 22 % too much across.) q^2 (1 - q)^(7/2) comes nearest to it of all q^m (1 - q)^n with half-integer
+    exponents; its factor is 3 / (4 pi B(7, 9/2)), with Euler's beta function.
     """
     t = max(1.0 - q, 0.0)
     s = support * support * support * support * support
-    return 156.6325 / s * q * sqrt(q) * t * t * t
-
-
-def poly6(r2: float, support: float):
-    """Poly6 kernel [1/m^3] of the squared distance, support H. Mueller et al. 2003."""
-    d = max(support * support - r2, 0.0)
-    h3 = support * support * support
-    return 315.0 / (64.0 * pi * h3 * h3 * h3) * d * d * d
+    return 339.204 / s * t * t * t * sqrt(t) * q * q  # in this order 0 for what lies ever so far
 
 
 def spiky(r: float, support: float):

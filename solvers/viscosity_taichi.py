@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from fluidbench.method.frame import FREE
 from fluidbench.native.scene import STICK
 
+from .conjugate_taichi import KERNELS
 from .neighbours_taichi import BoxT, ListsT, face_kind, image_velocity
 from .pairs_taichi import over_pairs, reader, vector_at, vector_into
 from .smoothing import drag_weight
@@ -15,24 +16,31 @@ from .taichi_bridge import (
     Phases,
     Quads,
     Vectors,
+    is_solid,
     phase_at,
     rest_density,
     struct_of,
     taichi_func,
     ti,
-    vec2,
     vec3,
     vec4,
 )
-from .viscosity_warp import CHUNK, DIRECTION, Viscous
+from .viscosity_warp import DIRECTION, EMPTIEST, Viscous
 
 ViscousT = struct_of(Viscous)
-Twos = ti.types.ndarray(dtype=vec2, ndim=1)
-Table = ti.types.ndarray(dtype=ti.f32, ndim=2)  # a row a world
-Counts = ti.types.ndarray(dtype=ti.i32, ndim=2)
-LEFT, RIGHT, STEP, TURN, ITERATIONS = range(5)  # columns of the totals, as in viscosity_warp.Totals
 weight = taichi_func(drag_weight)
 direction_at = reader(DIRECTION)
+
+
+@ti.func
+def near(num, other, r2):
+    return other[3] * weight(ti.sqrt(r2) / num.support, num.support)
+
+
+@ti.func
+def fullness_pair(num, own, begun, other, r):
+    r2 = r.norm_sqr()
+    return ti.Vector([near(num, other, r2) * r2 / 3.0])
 
 
 @ti.func
@@ -49,10 +57,36 @@ def pair(num, own, begun, other, r):
     u, s, r2 = vector_at(own, 4) - vector_at(other, 4), vector_at(other, 9) * r, r.norm_sqr()
     viscosity = 2.0 * own[7] * other[7] / ti.max(own[7] + other[7], 1.0e-30)
     drag = 5.0 * viscosity / (own[8] * other[8] * ti.max(r2, 1.0e-6 * num.support * num.support))
-    return -other[3] * weight(ti.sqrt(r2) / num.support, num.support) * drag * (r.dot(u) * r + s.dot(u) * s)
+    return -near(num, other, r2) * drag * (r.dot(u) * r + s.dot(u) * s)
 
 
 summed_over = over_pairs(DIRECTION, 3, pair, seen)
+fullness_over = over_pairs(DIRECTION, 1, fullness_pair)
+
+
+@ti.kernel
+def fullness(
+    num: ViscousT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    inside: Ints,
+    capacity: int,
+    count: Ints,
+    rows: Quads,
+    dt: Floats,
+    held: Ints,
+    mass: Floats,
+    volume: Floats,
+    written: Quads,
+    found: Vectors,
+):
+    for i in range(held.shape[0]):
+        if i % capacity < count[i // capacity]:
+            own = direction_at(rows, i)
+            sums = fullness_over(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+            written[3 * i + 2] = vec4(ti.sqrt(ti.max(sums[0], EMPTIEST)), 1.0, 1.0, 1.0)
 
 
 @ti.kernel
@@ -68,6 +102,9 @@ def image(
     rows: Quads,
     dt: Floats,
     held: Ints,
+    mass: Floats,
+    volume: Floats,
+    written: Quads,
     found: Vectors,
 ):
     for i in range(held.shape[0]):
@@ -77,8 +114,19 @@ def image(
             if held[i] == FREE:
                 own = direction_at(rows, i)
                 sums = summed_over(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
-                out = vector_at(own, 4) - dt[world] * sums
+                out = vector_at(own, 4) - dt[world] / rest_density(mass, volume, i) * sums
             found[i] = out
+
+
+@ti.func
+def resistance(phase, elastic, kept, h):
+    """See viscosity_warp.py."""
+    modulus = kept * phase.shear_modulus
+    if is_solid(phase):
+        modulus = ti.max(modulus, (phase.bulk_modulus + 4.0 / 3.0 * phase.shear_modulus) / 3.0)
+    if kept == 1.0:
+        modulus *= 2.0
+    return phase.viscosity + ti.select(elastic == 1, h * modulus, 0.0)
 
 
 @ti.kernel
@@ -92,9 +140,11 @@ def open_solve(
     position: Vectors,
     velocity: Vectors,
     acceleration: Vectors,
-    mass: Floats,
     volume: Floats,
     drag: Vectors,
+    elastic: int,
+    kept: Floats,
+    impulse: int,
     aim: Vectors,
     trial: Vectors,
     rows: Quads,
@@ -102,84 +152,14 @@ def open_solve(
     for i in range(held.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world]:
-            x, given, guess = position[i], velocity[i], velocity[i]
+            x, given, guess = position[i] - impulse * dt[world] * velocity[i], velocity[i], velocity[i]
             if held[i] == FREE:
                 given += dt[world] * acceleration[i]
                 guess = given + dt[world] * drag[i]
             aim[i], trial[i] = given, guess
-            viscosity = phase_at(phases, world, phase_of[i]).viscosity
-            rows[3 * i] = vec4(x[0], x[1], x[2], mass[i])
+            viscosity = resistance(phase_at(phases, world, phase_of[i]), elastic, kept[i], dt[world])
+            rows[3 * i] = vec4(x[0], x[1], x[2], volume[i])
             rows[3 * i + 1] = vec4(guess[0], guess[1], guess[2], viscosity)
-            rows[3 * i + 2] = vec4(rest_density(mass, volume, i), 1.0, 1.0, 1.0)
-
-
-@ti.kernel
-def residual_of(
-    capacity: int,
-    count: Ints,
-    held: Ints,
-    mass: Floats,
-    aim: Vectors,
-    found: Vectors,
-    residual: Vectors,
-    rows: Quads,
-    partial: Twos,
-):
-    for chunk in range(partial.shape[0]):
-        world, sums = chunk * CHUNK // capacity, vec2(0.0)
-        for lane in range(CHUNK):
-            i = chunk * CHUNK + lane
-            if i - world * capacity < count[world]:
-                r = vec3(0.0)
-                if held[i] == FREE:
-                    r = aim[i] - found[i]
-                residual[i] = r
-                rows[3 * i + 1] = vec4(r[0], r[1], r[2], rows[3 * i + 1][3])
-                sums += mass[i] * vec2(r.norm_sqr(), aim[i].norm_sqr())
-        partial[chunk] = sums
-
-
-@ti.kernel
-def along(capacity: int, count: Ints, mass: Floats, rows: Quads, found: Vectors, partial: Twos):
-    for chunk in range(partial.shape[0]):
-        world, total = chunk * CHUNK // capacity, 0.0
-        for lane in range(CHUNK):
-            i = chunk * CHUNK + lane
-            if i - world * capacity < count[world]:
-                total += mass[i] * rows[3 * i + 1].xyz.dot(found[i])
-        partial[chunk] = vec2(total, 0.0)
-
-
-@ti.kernel
-def descend(
-    capacity: int,
-    count: Ints,
-    mass: Floats,
-    rows: Quads,
-    found: Vectors,
-    totals: Table,
-    trial: Vectors,
-    residual: Vectors,
-    partial: Twos,
-):
-    for chunk in range(partial.shape[0]):
-        world, total = chunk * CHUNK // capacity, 0.0
-        for lane in range(CHUNK):
-            i = chunk * CHUNK + lane
-            if i - world * capacity < count[world]:
-                trial[i] += totals[world, STEP] * rows[3 * i + 1].xyz
-                residual[i] -= totals[world, STEP] * found[i]
-                total += mass[i] * residual[i].norm_sqr()
-        partial[chunk] = vec2(total, 0.0)
-
-
-@ti.kernel
-def turn(capacity: int, count: Ints, totals: Table, residual: Vectors, rows: Quads):
-    for i in range(residual.shape[0]):
-        world = i // capacity
-        if i - world * capacity < count[world]:
-            p = residual[i] + totals[world, TURN] * rows[3 * i + 1].xyz
-            rows[3 * i + 1] = vec4(p[0], p[1], p[2], rows[3 * i + 1][3])
 
 
 @ti.kernel
@@ -204,78 +184,4 @@ def close_solve(
             target[i] += change
 
 
-@ti.func
-def summed(partial: ti.template(), world, chunks):
-    """The sum over a world's chunks, in double precision."""
-    left, right = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-    ti.loop_config(serialize=True)
-    for k in range(world * chunks, (world + 1) * chunks):
-        left += partial[k][0]
-        right += partial[k][1]
-    return vec2(left, right)
-
-
-@ti.kernel
-def weigh_start(num: ViscousT, chunks: int, team: int, partial: Twos, totals: Table, going: Ints):
-    for world in range(totals.shape[0]):
-        sums = summed(partial, world, chunks)
-        for k in ti.static(range(5)):
-            totals[world, k] = 0.0
-        totals[world, LEFT], totals[world, RIGHT] = sums[0], sums[1]
-        if sums[0] > num.tolerance * num.tolerance * sums[1]:
-            ti.atomic_or(going[0], 1)
-
-
-@ti.kernel
-def weigh_step(num: ViscousT, chunks: int, team: int, partial: Twos, totals: Table, going: Ints):
-    for world in range(totals.shape[0]):
-        sums = summed(partial, world, chunks)
-        totals[world, STEP] = 0.0
-        wanted = totals[world, LEFT] > num.tolerance * num.tolerance * totals[world, RIGHT]
-        if wanted:
-            totals[world, ITERATIONS] += 1.0
-            if sums[0] > 0.0:
-                totals[world, STEP] = totals[world, LEFT] / sums[0]
-        if world == 0:
-            going[0] = 0
-
-
-@ti.kernel
-def weigh_turn(num: ViscousT, chunks: int, team: int, partial: Twos, totals: Table, going: Ints):
-    for world in range(totals.shape[0]):
-        sums = summed(partial, world, chunks)
-        totals[world, TURN] = 0.0
-        if totals[world, STEP] > 0.0:
-            totals[world, TURN] = sums[0] / totals[world, LEFT]
-            totals[world, LEFT] = sums[0]
-            more = totals[world, ITERATIONS] < ti.cast(num.most, ti.f32)
-            if more and sums[0] > num.tolerance * num.tolerance * totals[world, RIGHT]:
-                ti.atomic_or(going[0], 1)
-
-
-@ti.kernel
-def note(num: ViscousT, totals: Table, going: Ints, counted: Counts, worst: Floats):
-    for world in range(totals.shape[0]):
-        over = ti.sqrt(totals[world, LEFT] / ti.max(totals[world, RIGHT], 1.0e-30))
-        counted[world, 0] += 1
-        counted[world, 1] += ti.cast(totals[world, ITERATIONS], ti.i32)
-        if over > num.tolerance:
-            counted[world, 2] += 1
-        worst[world] = ti.max(worst[world], over)
-        if world == 0:
-            going[0] = 0
-
-
-PASSES = SimpleNamespace(
-    image=image,
-    open_solve=open_solve,
-    residual_of=residual_of,
-    along=along,
-    descend=descend,
-    turn=turn,
-    close_solve=close_solve,
-    weigh_start=weigh_start,
-    weigh_step=weigh_step,
-    weigh_turn=weigh_turn,
-    note=note,
-)
+PASSES = SimpleNamespace(fullness=fullness, image=image, open_solve=open_solve, **KERNELS, close_solve=close_solve)

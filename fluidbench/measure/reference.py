@@ -21,7 +21,8 @@ GATE_SHIFT = 0.3  # Martin & Moyce's clock starts when the gate does; their T ma
 
 @dataclass(frozen=True)
 class Answer:
-    """One comparison. `error` is relative to the reference unless `measure` says otherwise."""
+    """One comparison. `error` is relative to the reference unless `measure` says otherwise; `reads` is the key of
+    the length at the end of a run that it is of, where it is of one."""
 
     quantity: str
     measured: float
@@ -29,6 +30,7 @@ class Answer:
     error: float
     measure: str
     source: str
+    reads: str = ""
 
 
 def table(name: str) -> pd.DataFrame:
@@ -89,7 +91,7 @@ def _area(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> 
         area *= float(np.mean([expansion.volume_ratio(t - release) for release in track.release_time(laid)]))
         source = "R Q / V"
     got = final["bead_area_m2"]
-    return Answer("bead area [m^2]", got, area, abs(got / area - 1.0), "relative", source)
+    return Answer("bead area [m^2]", got, area, abs(got / area - 1.0), "relative", source, "bead_area_m2")
 
 
 def _slump(scenario: Scenario, final: dict[str, float]) -> Answer:
@@ -109,7 +111,7 @@ def _slump(scenario: Scenario, final: dict[str, float]) -> Answer:
     expected = float(np.interp(tau, data["tau_prime"], data[["slump_vof", "slump_mpm_extrap"]].mean(axis=1)))
     off = abs(final["slump"] - expected)
     source = "viscoplastic_slump_crosscheck.csv"
-    return Answer(f"slump at tau' = {tau:.3g}", final["slump"], expected, off, "absolute", source)
+    return Answer(f"slump at tau' = {tau:.3g}", final["slump"], expected, off, "absolute", source, "slump")
 
 
 def martin_moyce(scenario: Scenario) -> tuple[float, float, pd.DataFrame]:

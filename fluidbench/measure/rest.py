@@ -18,19 +18,16 @@ AXES = "xyz"
 
 
 def creep(series: pd.DataFrame, scenario: Scenario) -> dict[str, float]:
-    """How fast the fastest length changed over the last fifth of a run [m/s]; nothing without lengths."""
-    window = _window(series)
-    went = _lengths(window, scenario)
-    if not went:
-        return {}
-    time = window["time_s"].to_numpy()
-    return {"creep_m_per_s": max(went.values()) / float(time[-1] - time[0])}
+    """How fast the fastest length changed over the last fifth of a run, or what of it the length is known for [m/s];
+    nothing without lengths."""
+    went = _lengths(_window(series), scenario).values()
+    return {"creep_m_per_s": max(distance / time for distance, time in went)} if went else {}
 
 
 def moving(series: pd.DataFrame, scenario: Scenario) -> tuple[str, ...]:
     """Lengths that over the last fifth of a run went by more than a twentieth of a spacing, by name."""
     window = _window(series)
-    return tuple(key for key, went in _lengths(window, scenario).items() if went > STILL * scenario.spacing)
+    return tuple(key for key, (went, _) in _lengths(window, scenario).items() if went > STILL * scenario.spacing)
 
 
 def at_rest(series: pd.DataFrame, scenario: Scenario) -> bool:
@@ -46,18 +43,18 @@ def at_rest(series: pd.DataFrame, scenario: Scenario) -> bool:
         return False
     if ends - begins < patience(scenario, float(window["top_m"].iloc[-1])):
         return False
-    went = [*_lengths(window, scenario).values(), *_center(window, scenario)]
+    went = [*(distance for distance, _ in _lengths(window, scenario).values()), *_center(window, scenario)]
     return all(distance <= STILL * scenario.spacing for distance in went)
 
 
 def patience(scenario: Scenario, height: float) -> float:
-    """Time in which matter of this height [m] that nothing held would go by a spacing d [s]: by falling,
+    """Time in which fresh matter of this height [m] that nothing held would go by a spacing d [s]: by falling,
     sqrt(2 d / g), and by a column's viscous sinking at rho g H / (3 mu), 3 mu d / (rho g H^2); 0 without weight. (mu
-    of a paste is that at a rate of shear of 1/s.)"""
+    of a paste is that at a rate of shear of 1/s; cured matter may rest for good, however thick it is.)"""
     weight, d = scenario.peak_acceleration, scenario.spacing
     if weight == 0.0:
         return 0.0
-    sinking = max((m.steady_viscosity / m.density for m in scenario.aged[1]), default=0.0)
+    sinking = scenario.material.steady_viscosity / scenario.material.density
     return float(np.sqrt(2.0 * d / weight)) + 3.0 * sinking * d / (weight * max(height, d) ** 2)
 
 
@@ -70,12 +67,14 @@ def _window(series: pd.DataFrame, least: int = 2) -> pd.DataFrame:
     return series.iloc[max(0, min(begins, len(time) - least)) :]
 
 
-def _lengths(window: pd.DataFrame, scenario: Scenario) -> dict[str, float]:
-    """How far each length went, between its extremes [m]: areas by their roots, a slump by the height it is of."""
+def _lengths(window: pd.DataFrame, scenario: Scenario) -> dict[str, tuple[float, float]]:
+    """(how far each length went, between its extremes [m]; the time it is known for [s]): areas by their roots, a slump
+    by the height it is of."""
     went = {}
     for key in window:
         name = str(key)
-        values = window[key].dropna().to_numpy()
+        known = window[["time_s", key]].dropna()
+        time, values = known["time_s"].to_numpy(), known[key].to_numpy()
         if len(values) < 2 or name.startswith(("resolution", "center")):
             continue
         if name == "slump":
@@ -84,7 +83,7 @@ def _lengths(window: pd.DataFrame, scenario: Scenario) -> dict[str, float]:
             values = np.sqrt(values)
         elif not name.endswith("_m"):
             continue
-        went[name] = float(np.ptp(values))
+        went[name] = float(np.ptp(values)), float(time[-1] - time[0])
     return went
 
 

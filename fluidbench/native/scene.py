@@ -38,7 +38,6 @@ class Phase:
     tait: float
     tension_limit: float
     wave_speed: float
-    cure: float
 
 
 @wp.struct
@@ -126,7 +125,7 @@ class Scene:
             rows = [s.material.levels() for s in self.scenarios]
             self.materials = [m for row in rows for m in row]
             self.levels = len(rows[0])  # rows of the phase table: levels of cure, the fresh material first
-            table = [self._phase(m, k / max(self.levels - 1, 1)) for row in rows for k, m in enumerate(row)]
+            table = [self._phase(m) for row in rows for m in row]
             self.phases = wp.array(table, dtype=Phase).reshape((self.worlds, self.levels))
 
     def _check_worlds(self) -> None:
@@ -143,9 +142,8 @@ class Scene:
                 if getattr(other.material, section) != getattr(self.scenario.material, section):
                     raise UserError(f"worlds must share material.{section}; world {i} differs")
 
-    def _phase(self, material: Material, cure: float) -> Phase:
+    def _phase(self, material: Material) -> Phase:
         phase = Phase()
-        phase.cure = cure
         phase.wave_speed = material.wave_speed(self.sound_speed)
         phase.density = material.density
         phase.bulk_modulus = material.bulk(self.sound_speed)
@@ -169,16 +167,6 @@ class Scene:
     def elastic(self) -> bool:
         """Whether anything has shear stiffness, now or later."""
         return self._any(lambda m: m.youngs_modulus is not None)
-
-    @property
-    def solid(self) -> bool:
-        """Whether anything never flows, now or later."""
-        return self._any(lambda m: m.is_solid)
-
-    @property
-    def flowing(self) -> bool:
-        """Whether anything has shear stiffness and flows, now or later."""
-        return self._any(lambda m: m.youngs_modulus is not None and not m.is_solid)
 
     @property
     def viscous(self) -> bool:

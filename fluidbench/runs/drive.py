@@ -85,10 +85,9 @@ class Drive:
         outcome.prepare_wall = time.perf_counter() - start
         if self.checkpoints is None or not self.checkpoints.restore(outcome):
             self.begin()
-        while session.now < self.end - self.near and outcome.verdict is Verdict.COMPLETED and not self.rested:
+        while session.now < self.end - self.near and self.going:
             self.leg()
-            going = outcome.verdict is Verdict.COMPLETED and not self.rested
-            if self.checkpoints is not None and self.checkpoints.due() and going:
+            if self.checkpoints is not None and self.checkpoints.due() and self.going:
                 self.checkpoints.write(outcome)
         outcome.simulated = session.now
         if outcome.verdict is Verdict.COMPLETED:
@@ -96,6 +95,11 @@ class Drive:
             if broken := session.conclude():
                 outcome.end(Verdict.DIVERGED, f"at t = {session.now:.4g} s {broken}", session.now)
         return outcome
+
+    @property
+    def going(self) -> bool:
+        """Whether nothing has ended the run yet."""
+        return self.outcome.verdict is Verdict.COMPLETED and not self.rested
 
     def begin(self) -> None:
         try:
@@ -154,12 +158,14 @@ class Drive:
                 outcome.end(Verdict.TIMEOUT, late, session.now)
 
     def too_slow(self) -> str | None:
-        """Over the wall limit, or certain to be: the pace only falls as particles are added."""
+        """Over the wall limit, or certain to be: the pace only falls as particles are added. (What may
+        come to rest at any time has its whole limit.)"""
         wall, limit, now = self.outcome.wall, self.wall_limit, self.session.now
         if limit is None:
             return None
         expected = wall * self.end / now
-        if wall > limit or (wall > min(PACE_SECONDS, limit) and expected > 2.0 * limit):
+        certain = self.rests is None and wall > min(PACE_SECONDS, limit) and expected > 2.0 * limit
+        if wall > limit or certain:
             return (
                 f"stopped at t = {now:.4g} s after {wall:.0f} s: at this pace the run takes at least {expected:.0f} s, "
                 f"the limit is {limit:.0f} s"

@@ -247,6 +247,17 @@ class Scenario(Model):
             speeds.append(expansion.speed(max(sizes)))
         return max(*speeds, math.sqrt(g * height))
 
+    @property
+    def emits(self) -> bool:
+        """Whether matter is fed in while time goes by."""
+        return self.nozzle is not None
+
+    @property
+    def narrowest(self) -> float:
+        """The narrowest side of what is put in: of a body, or across the nozzle [m]."""
+        sizes = [2.0 * float(min(body.extent)) for body in self.bodies]
+        return min(sizes + ([] if self.nozzle is None else [self.nozzle.diameter]))
+
     def _top_speed(self, body: Body) -> float:
         """The fastest initial speed [m/s]: of the body's particles where these are given, or their speeds are by
         expressions, which may vary faster than any grid would show; at the corners of its box otherwise."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from statistics import mean
 
+from ..measure.rest import LAST, STILL
 from ..measure.tower import Print
 from ..method.verdict import Evidence, evidence_of
 from ..report.table import Table, label, number, spread
@@ -13,7 +14,7 @@ from ..runs.record import Record, Run
 from .lengths import lengths_of
 
 MOVES = " ~"  # beside a length that was read from what still moved
-MOVED = "by more than 0.05 spacings over the last fifth of the run"
+MOVED = f"by more than {STILL:g} spacings over the last {100 * LAST:g} % of the run"
 
 
 def by_method(results: Sequence[Run]) -> dict[str, list[Record]]:
@@ -48,10 +49,9 @@ def against_reference(results: Sequence[Run]) -> Table | None:
     table = Table("Against references", ["", "method", "measured", "reference", "error", "measure", "source"])
     reasons = dict.fromkeys(line for r in results for line in r.record.not_compared)
     for result in results:
-        moved = {result.record.measures[key] for key in result.record.moving}
         if result.record.repeat == 0:
             for a in result.record.answers:
-                measured = number(a.measured) + (MOVES if a.measured in moved else "")
+                measured = number(a.measured) + (MOVES if a.reads in result.record.moving else "")
                 percent = not a.measure.startswith(("absolute", "in discs"))
                 error = f"{100 * a.error:.2f} %" if percent else f"{a.error:.4f}"
                 table.rows.append([a.quantity, result.label, measured, number(a.reference), error, a.measure, a.source])

@@ -66,5 +66,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=LENGTH / 50,
-    exempt={"pbd": "bonds are central forces (Poisson ratio 1/4) and sweeps convey part of their stiffness"},
 )

@@ -74,5 +74,5 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=HALF / 16,
-    exempt={"pbd": "shear stiffness is limited by the time step"},
+    exempt={"pbd": "the lattice breaks up in the sheared layer: 6 % at d and d / 2, 4 % at half the time step"},
 )

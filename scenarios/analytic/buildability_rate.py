@@ -90,5 +90,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=RADIUS / 6,
-    exempt={"pbd": "shear stiffness is limited by the time step"},
 )

@@ -49,5 +49,4 @@ CASE = Case(
     fine_tolerance=0.10,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "shear stiffness is limited by the time step"},
 )

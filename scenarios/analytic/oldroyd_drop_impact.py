@@ -64,5 +64,4 @@ CASE = Case(
     fine_tolerance=0.03,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "shear stiffness is limited by the time step"},
 )

@@ -82,5 +82,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=HALF / 16,
-    exempt={"pbd": "shear stiffness is limited by the time step"},
 )

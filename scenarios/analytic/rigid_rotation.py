@@ -37,18 +37,12 @@ def momentum(frame: dict[str, np.ndarray]) -> float:
 
 
 def evaluate(runs: dict[str, Run]) -> Finding:
-    """|L / L0 - 1| per turn; PBD against the formula of what it loses."""
+    """|L / L0 - 1| per turn."""
     run = runs["disc"]
     share = np.array([momentum(frame) for frame in run.frames]) / momentum(run.frames[0])
-    # projection moves particles inwards across their velocity (references.md, A)
-    stiff = 1.0 / np.sqrt(1.0 + 2.0 * OMEGA**2 * run.dt * run.times)
-    numbers = (
-        Number("L / L0 after two turns", share[-1], 1.0),
-        Number("L / L0 after PBD's formula at this dt", stiff[-1], 1.0),
-    )
+    numbers = (Number("L / L0 after two turns", share[-1], 1.0),)
     curve = Curve("momentum", "time [s]", "L / L0", run.times, share, run.times, np.ones_like(share))
-    exact = stiff if run.method == "pbd" else np.ones_like(share)
-    return Finding(float(np.abs(share / exact - 1.0).max()) / TURNS, numbers, (curve,))
+    return Finding(float(np.abs(share - 1.0).max()) / TURNS, numbers, (curve,))
 
 
 CASE = Case(
@@ -56,10 +50,10 @@ CASE = Case(
     "an elastic disc spinning freely",
     "kinematics",
     "exact; references.md, A",
-    "|L / L0 - 1| per turn; PBD: departure from L0 / sqrt(1 + 2 omega^2 dt t)",
+    "|L / L0 - 1| per turn",
     spacing=0.01,
     tolerance=1e-3,
-    tolerances={"pbd": 0.1},
+    tolerances={"pbd": 5e-3},  # what the residual of an implicit solve leaves, see docs/physics.md
     scenarios=scenarios,
     evaluate=evaluate,
 )

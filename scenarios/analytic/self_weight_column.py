@@ -65,5 +65,5 @@ CASE = Case(
     fine_tolerance=0.005,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "bonds are central forces: the confined modulus is 1.2 E, here it should be 1.35 E"},
+    exempt={"pbd": "3 % too stiff at d and at d / 2; cause not known"},
 )

@@ -43,5 +43,4 @@ CASE = Case(
     fine_tolerance=0.04,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "shear stiffness is limited by the time step"},
 )

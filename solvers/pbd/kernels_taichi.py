@@ -3,25 +3,14 @@ equations."""
 
 from types import SimpleNamespace
 
-from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.method.frame import FREE
 from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import FRICTION, PERIODIC, STICK
+from fluidbench.native.scene import FRICTION, PERIODIC
 
-from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
-from ..flow_taichi import strained
 from ..images import WALL_INSET
-from ..neighbours_taichi import BoxT, ListsT, contained, image_velocity
-from ..pairs_taichi import (
-    matrix_into,
-    over_pairs,
-    reader,
-    stressed,
-    symmetric_at,
-    vector_at,
-    vector_into,
-    writer,
-)
-from ..smoothing import poly6, spiky, spiky_slope
+from ..neighbours_taichi import BoxT, ListsT, contained
+from ..pairs_taichi import over_pairs, reader, vector_at, vector_into
+from ..smoothing import spiky
 from ..taichi_bridge import (
     Floats,
     Forces,
@@ -31,27 +20,19 @@ from ..taichi_bridge import (
     Vectors,
     beyond,
     force_at,
-    mat3,
+    is_solid,
     phase_at,
-    rest_density,
-    struct_of,
     taichi_func,
     ti,
     too_fast,
-    vec3,
     vec4,
 )
-from . import laws
-from .bonds_taichi import bonded
-from .kernels_warp import FARTHEST, HURRIED, MOVING, PLACE, PULLING, PUSH, SLACK, SLACK_SOLID, Numbers
+from .elastic_taichi import KERNELS, NumbersT, sloping
+from .kernels_warp import DRAWN, FARTHEST, HURRIED, SLACK, SLACK_SOLID
+from .numbers import PLACE, PUSH
 
-kernel = taichi_func(poly6)
 summed = taichi_func(spiky)
-gradient = taichi_func(spiky_slope)
-conveyed_modulus = taichi_func(laws.conveyed_modulus, laws.largest_modulus)
-NumbersT = struct_of(Numbers)
-place_of, push_of, moving_of, pulling_of = (reader(n) for n in (PLACE, PUSH, MOVING, PULLING))
-write_pulling = writer(PULLING)
+place_of, push_of = reader(PLACE), reader(PUSH)
 
 
 @ti.func
@@ -76,6 +57,7 @@ def predict(
     held: Ints,
     velocity: Vectors,
     volume: Floats,
+    pulled: Vectors,
     position: Vectors,
     motion: Vectors,
     places: Quads,
@@ -86,7 +68,7 @@ def predict(
         if i - world * capacity < count[world]:
             v = velocity[i]
             if held[i] == FREE:
-                v += dt[world] * force_at(force, world, position[i])
+                v += dt[world] * (force_at(force, world, position[i]) + pulled[i])
             free = position[i] + dt[world] * v
             if too_fast(v, HURRIED * box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
@@ -96,14 +78,8 @@ def predict(
 
 
 @ti.func
-def sharing(num, other, r):
-    """The gradient of the density that a neighbour brings, over its kernel's normalisation."""
-    return other[3] * gradient(r.norm(), num.support) / ti.max(r.norm(), 1.0e-9) * r
-
-
-@ti.func
 def multiplier_pair(num, own, begun, other, r):
-    g = num.weight * sharing(num, other, r)
+    g = num.weight * sloping(num, other, r)
     sums = ti.Vector.zero(ti.f32, 5)
     sums[0], sums[4] = other[3] * summed(r.norm(), num.support), g.norm_sqr()
     return vector_into(sums, 1, g)
@@ -123,6 +99,7 @@ def multipliers(
     capacity: int,
     count: Ints,
     places: Quads,
+    dt: Floats,
     phases: Phases,
     phase_of: Ints,
     held: Ints,
@@ -137,15 +114,23 @@ def multipliers(
             sums = constrained_by(num, box, lists, entries, number, places, held, i, own, vec4(0.0))
             dense = num.weight * (sums[0] + 0.5 * (own[3] + num.spacing**3) * summed(0.0, num.support))
             fill[i] = dense
-            limit = 1.0 + (SLACK_SOLID if bonded(phase_at(phases, world, phase_of[i])) else SLACK)
-            metric = (sums[4] + vector_at(sums, 1).norm_sqr()) * num.spacing * num.spacing
+            phase = phase_at(phases, world, phase_of[i])
+            slope = vector_at(sums, 1).norm() * num.spacing
+            metric = sums[4] * num.spacing * num.spacing + slope * slope + num.relaxation
+            multiplier = -ti.max(dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK), 0.0) / metric
+            if phase.shear_modulus > 0.0 and not is_solid(phase):
+                even = ti.math.clamp(2.0 - 4.0 * slope / num.face_slope, 0.0, 1.0)
+                within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
+                wave = dt[world] / num.spacing
+                compliance = num.iterations * phase.density / (phase.bulk_modulus * wave * wave)
+                multiplier += DRAWN * even * within * ti.max(1.0 - SLACK - dense, 0.0) / (metric + compliance)
             pushes[2 * i] = places[i]
-            pushes[2 * i + 1] = vec4(-ti.max(dense - limit, 0.0) / (metric + num.relaxation), 0.0, 0.0, 0.0)
+            pushes[2 * i + 1] = vec4(multiplier, 0.0, 0.0, 0.0)
 
 
 @ti.func
 def correct_pair(num, own, begun, other, r):
-    return (own[4] + other[4]) * num.weight * sharing(num, other, r)
+    return (own[4] + other[4]) * num.weight * sloping(num, other, r)
 
 
 corrected_by = over_pairs(PUSH, 3, correct_pair)
@@ -162,6 +147,7 @@ def correct(
     capacity: int,
     count: Ints,
     pushes: Quads,
+    dt: Floats,
     phases: Phases,
     phase_of: Ints,
     held: Ints,
@@ -222,151 +208,20 @@ def follow(
     count: Ints,
     dt: Floats,
     held: Ints,
-    velocity: Vectors,
-    motion: Vectors,
+    drag: Vectors,
     position: Vectors,
 ):
-    for i in range(velocity.shape[0]):
+    for i in range(drag.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world] and held[i] == FREE:
-            free = position[i] + (dt[world] * velocity[i] - motion[i])
+            free = position[i] + dt[world] * dt[world] * drag[i]
             position[i] = contained(box, free, WALL_INSET * num.spacing)
 
 
-@ti.kernel
-def pack(capacity: int, count: Ints, position: Vectors, volume: Floats, velocity: Vectors, moving: Quads):
-    for i in range(position.shape[0]):
-        if i % capacity < count[i // capacity]:
-            x, v = position[i], velocity[i]
-            moving[2 * i] = vec4(x[0], x[1], x[2], volume[i])
-            moving[2 * i + 1] = vec4(v[0], v[1], v[2], 0.0)
-
-
-@ti.kernel
-def settle(capacity: int, count: Ints, smoothed: Vectors, velocity: Vectors, moving: Quads):
-    for i in range(velocity.shape[0]):
-        if i % capacity < count[i // capacity]:
-            v = smoothed[i]
-            velocity[i] = v
-            moving[2 * i + 1] = vec4(v[0], v[1], v[2], 0.0)
-
-
 @ti.func
-def moving_seen(box, extra: ti.template(), row, j, code):
-    return vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
-
-
-@ti.func
-def pulling_seen(box, extra: ti.template(), row, j, code):
-    moved = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
-    return matrix_into(moved, 7, mirrored_stress(box, stressed(row, 7), code))
-
-
-@ti.func
-def strain_pair(num, own, begun, other, r):
-    g = sharing(num, other, r)
-    square = -g.outer_product(r)
-    sums = matrix_into(ti.Vector.zero(ti.f32, 15), 0, -(vector_at(own, 4) - vector_at(other, 4)).outer_product(g))
-    sums = vector_into(sums, 9, vec3(square[0, 0], square[1, 1], square[2, 2]))
-    return vector_into(sums, 12, vec3(square[0, 1], square[0, 2], square[1, 2]))
-
-
-strained_by = over_pairs(MOVING, 15, strain_pair, moving_seen)
-
-
-@ti.kernel
-def strain(
-    num: NumbersT,
-    box: BoxT,
-    lists: ListsT,
-    entries: Ints,
-    number: Ints,
-    inside: Ints,
-    capacity: int,
-    count: Ints,
-    rows: Quads,
-    dt: Floats,
-    phases: Phases,
-    phase_of: Ints,
-    held: Ints,
-    mass: Floats,
-    volume: Floats,
-    elastic_normal: Vectors,
-    elastic_shear: Vectors,
-    pulling: Quads,
-    smoothed: Vectors,
-):
-    for i in range(held.shape[0]):
-        world = i // capacity
-        if i - world * capacity < count[world]:
-            phase = phase_at(phases, world, phase_of[i])
-            own = moving_of(rows, i)
-            carried = mat3(0.0)
-            if not bonded(phase):
-                sums = strained_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
-                correction = symmetric_inverse(symmetric_at(sums, 9))
-                rest = rest_density(mass, volume, i)
-                modulus = conveyed_modulus(phase.shear_modulus, num.stiffness, rest, num.spacing, dt[world])
-                b, s = elastic_normal[i], elastic_shear[i]
-                if held[i] != CARRIED:
-                    b, s, _ = strained(phase, modulus, stressed(sums, 0) @ correction, b, s, dt[world])
-                    elastic_normal[i], elastic_shear[i] = b, s
-                carried = elastic_stress(modulus, b, s, 0.0) @ correction
-            row = ti.Vector.zero(ti.f32, PULLING)
-            for c in ti.static(range(7)):
-                row[c] = own[c]
-            write_pulling(pulling, i, matrix_into(row, 7, carried))
-
-
-@ti.func
-def pull_pair(num, own, begun, other, r):
-    a = (stressed(own, 7) + stressed(other, 7)) @ sharing(num, other, r)
-    u = vector_at(own, 4) - vector_at(other, 4)
-    w = other[3] * num.weight * kernel(r.norm_sqr(), num.support)
-    damping = -w * u.dot(r) / ti.max(r.norm_sqr(), 1.0e-18) * r
-    return vector_into(vector_into(ti.Vector.zero(ti.f32, 6), 0, a), 3, damping)
-
-
-pulled_by = over_pairs(PULLING, 6, pull_pair, pulling_seen)
-
-
-@ti.kernel
-def pull(
-    num: NumbersT,
-    box: BoxT,
-    lists: ListsT,
-    entries: Ints,
-    number: Ints,
-    inside: Ints,
-    capacity: int,
-    count: Ints,
-    rows: Quads,
-    dt: Floats,
-    phases: Phases,
-    phase_of: Ints,
-    held: Ints,
-    mass: Floats,
-    volume: Floats,
-    elastic_normal: Vectors,
-    elastic_shear: Vectors,
-    pulling: Quads,
-    smoothed: Vectors,
-):
-    for i in range(held.shape[0]):
-        world = i // capacity
-        if i - world * capacity < count[world]:
-            own = pulling_of(rows, i)
-            v = vector_at(own, 4)
-            if held[i] == FREE:
-                sums = pulled_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
-                v += dt[world] / rest_density(mass, volume, i) * vector_at(sums, 0) + num.calm * vector_at(sums, 3)
-            smoothed[i] = v
-
-
-@ti.func
-def wall_friction_acts(kind, gap, spacing, solid):
+def wall_friction_acts(kind, gap, spacing):
     """Whether a particle this far from a face feels its friction."""
-    return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
+    return gap < spacing and kind == FRICTION
 
 
 @ti.kernel
@@ -377,8 +232,6 @@ def wall_friction(
     dt: Floats,
     held: Ints,
     spacing: float,
-    phases: Phases,
-    phase_of: Ints,
     force: Forces,
     position: Vectors,
     velocity: Vectors,
@@ -387,21 +240,18 @@ def wall_friction(
         world = i // capacity
         if i - world * capacity < count[world] and held[i] == FREE:
             v, x = velocity[i], position[i]
-            solid = bonded(phase_at(phases, world, phase_of[i]))
             weight = force_at(force, world, x)
             for axis in ti.static(range(3)):
-                low = wall_friction_acts(box.lower_kind[axis], x[axis] - box.lower[axis], spacing, solid)
-                high = wall_friction_acts(box.upper_kind[axis], box.upper[axis] - x[axis], spacing, solid)
+                low = wall_friction_acts(box.lower_kind[axis], x[axis] - box.lower[axis], spacing)
+                high = wall_friction_acts(box.upper_kind[axis], box.upper[axis] - x[axis], spacing)
                 if low or high:
-                    kind, friction = box.lower_kind[axis], box.lower_friction[axis]
+                    friction = box.lower_friction[axis]
                     if high:
-                        kind, friction = box.upper_kind[axis], box.upper_friction[axis]
+                        friction = box.upper_friction[axis]
                     slide = v
                     slide[axis] = 0.0
                     speed = slide.norm()
-                    lost = speed
-                    if kind == FRICTION:
-                        lost = ti.min(friction * ti.abs(weight[axis]) * dt[world], speed)
+                    lost = ti.min(friction * ti.abs(weight[axis]) * dt[world], speed)
                     slide *= 1.0 - lost / ti.max(speed, 1.0e-12)
                     slide[axis] = v[axis]
                     v = slide
@@ -415,9 +265,6 @@ PASSES = SimpleNamespace(
     apply=apply,
     velocities=velocities,
     follow=follow,
-    pack=pack,
-    settle=settle,
-    strain=strain,
-    pull=pull,
     wall_friction=wall_friction,
+    **KERNELS,
 )

@@ -4,9 +4,7 @@ import warp as wp
 
 from fluidbench.method.frame import FREE
 from fluidbench.native.crew import index_of
-from fluidbench.native.scene import FRICTION, PERIODIC, STICK, Box, Force, Phase, force_at
-
-from .bonds import bonded
+from fluidbench.native.scene import FRICTION, PERIODIC, Box, Force, force_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -22,10 +20,9 @@ def pushed(box: Box, free: wp.vec3, inside: wp.vec3):
 
 
 @wp.func
-def rubbing(kind: int, gap: float, spacing: float, solid: bool):
-    """Whether a particle this far from a face feels its friction: stick walls hold the viscous by its images, solids
-    here."""
-    return gap < spacing and (kind == FRICTION or (kind == STICK and solid))
+def rubbing(kind: int, gap: float, spacing: float):
+    """Whether a particle this far from a face feels its friction."""
+    return gap < spacing and kind == FRICTION
 
 
 @wp.kernel
@@ -37,34 +34,29 @@ def wall_friction(
     dt: wp.array(dtype=float),
     held: wp.array(dtype=int),
     spacing: float,
-    phases: wp.array2d(dtype=Phase),
-    phase_of: wp.array(dtype=int),
     force: wp.array(dtype=Force),
     position: wp.array(dtype=wp.vec3),
     # outputs
     velocity: wp.array(dtype=wp.vec3),
 ):
-    """Particles touching a friction wall lose tangential speed by Coulomb's law; solids on a stick wall all of it."""
+    """Particles touching a friction wall lose tangential speed by Coulomb's law."""
     i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
         v = velocity[i]
         x = position[i]
-        solid = bonded(phases[world, phase_of[i]])
         for axis in range(3):
-            kind, friction = box.lower_kind[axis], box.lower_friction[axis]
-            touching = rubbing(kind, x[axis] - box.lower[axis], spacing, solid)
-            if rubbing(box.upper_kind[axis], box.upper[axis] - x[axis], spacing, solid):
-                kind, friction = box.upper_kind[axis], box.upper_friction[axis]
+            friction = box.lower_friction[axis]
+            touching = rubbing(box.lower_kind[axis], x[axis] - box.lower[axis], spacing)
+            if rubbing(box.upper_kind[axis], box.upper[axis] - x[axis], spacing):
+                friction = box.upper_friction[axis]
                 touching = True
             if touching:
                 normal = v[axis]
                 slide = v
                 slide[axis] = 0.0
                 speed = wp.length(slide)
-                grip = speed
-                if kind == FRICTION:
-                    grip = wp.min(friction * wp.abs(force_at(force[world], x)[axis]) * dt[world], speed)
+                grip = wp.min(friction * wp.abs(force_at(force[world], x)[axis]) * dt[world], speed)
                 v = slide * (1.0 - grip / wp.max(speed, 1.0e-12))
                 v[axis] = normal
         velocity[i] = v

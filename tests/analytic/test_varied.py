@@ -98,3 +98,14 @@ def test_rows_of_sph_do_not_slide_past_each_other(duration):
     y, u = last["position"][:, 1].astype(float), last["velocity"][:, 0].astype(float)
     assert relative_l2(u, bingham_channel.exact(y)) < 0.1
     assert order(last, channel)["least_distance"] > 0.75
+
+
+@pytest.mark.parametrize("method", ["sph", "pbd"])
+def test_a_whisper_of_implicit_viscosity_changes_no_paste(method):
+    """PBD's bead once fell apart at 0.001 Pa s, which moves nothing."""
+    widths = []
+    for viscosity in (0.0, 1e-3):
+        line = load("line_bead", {"spacing": 2e-3, "material.viscosity": viscosity})
+        config = {"viscosity": "implicit"} if method == "sph" else {}
+        widths.append(final_lengths(frames(line, method, **config)[-1], line)["bead_width_m"])
+    assert widths[1] == pytest.approx(widths[0], rel=0.05)

@@ -147,6 +147,13 @@ def test_a_run_is_stopped_when_it_cannot_make_it(wall, done, limit, late):
         )
 
 
+@pytest.mark.parametrize(("wall", "late"), [(8.1, False), (9.9, False), (10.1, True)])
+def test_a_run_that_may_rest_at_any_time_has_its_whole_limit(wall, late):
+    made = SimpleNamespace(schedule=(0.01, 100, 10))
+    drive = Drive(SimpleNamespace(now=0.01), made, wall_limit=10.0, outcome=Outcome(wall=wall), rests=lambda: False)
+    assert (drive.too_slow() is not None) is late
+
+
 def test_a_run_without_time_times_out_and_shows_no_more():
     for interval, shown in ((0.25, [0]), (0.125, [0, 1])):  # what is due at its end is shown still
         sim, seen = falling(output_interval=interval), []

@@ -12,14 +12,13 @@ from fluidbench.native.scene import PERIODIC
 from fluidbench.native.simulation import Simulation
 from fluidbench.scenario import Scenario
 from solvers.images import INDEX_BITS, INDEX_MASK
-from solvers.pbd.bonds import DAMPED
-from solvers.pbd.laws import conveyed_modulus
 
 TOLERANCE = 2e-5  # float32; sums may be taken in another order
 GRID = ("raw", "moving")
 BY_CHANCE = ("table", "block_of")  # in the order in which threads come, on a GPU
 GARBAGE = 1.0e6  # in slots that nobody may touch
 OWN_LISTS = ("neighbours.entries", "neighbours.number", "neighbours.inside")  # each language goes through its own
+PARTS = (("neighbours.", "neighbours"), ("", "elastic"))  # of a solver that hold arrays
 # Rows that neighbours are asked for: which of their floats are one quantity, and judged by its size.
 PLACE, VELOCITY = [(0, 3), (3, 4)], (4, 7)
 ROWS = {
@@ -27,7 +26,7 @@ ROWS = {
     "places": PLACE,
     "pushes": [*PLACE, (4, 5)],
     "moving": [*PLACE, VELOCITY],
-    "pulling": [*PLACE, VELOCITY, (7, 16)],
+    "pulling": [*PLACE, (4, 13)],
 }
 STATES = {
     8: [*PLACE, VELOCITY, (7, 8)],
@@ -46,14 +45,8 @@ def arrays_of(sim: Simulation) -> dict[str, wp.array]:
     found = {f"pool.{name}": array for name, array in sim.pool.fields.items()}
     found |= {"pool.count": sim.pool.count, "pool.fault": sim.pool.fault}
     found |= {name: getattr(sim.scene, name) for name in ("dt", "force", "phases")}
-    owners = {"": sim.solver, "neighbours.": getattr(sim.solver, "neighbours", None)}
-    network = getattr(sim.solver, "network", None)
-    if network is not None:
-        found |= {
-            f"bonds.{name}": getattr(network.bonds, name)
-            for name in ("number", "partner", "rest", "multiplier", "state")
-        }
-    for prefix, owner in owners.items():
+    parts = [("", sim.solver), *((prefix, getattr(sim.solver, name, None)) for prefix, name in PARTS)]
+    for prefix, owner in parts:
         for name, value in vars(owner).items() if owner is not None else ():
             if isinstance(value, wp.array):
                 found[prefix + name] = value
@@ -88,22 +81,15 @@ class Twins:
 
     def _least_scales(self) -> dict[str, float]:
         """Of what is made of numbers that cancel: SPH's shifts of crowding of order 1 / h, PBD's multipliers of
-        densities of order 1, those of its bonds of lengths of a spacing, its stress of elastic tensors of order 1."""
+        densities of order 1, its stress of elastic tensors of order 1."""
         sim = self.warp
         if self.method == "sph":
             speed, dt = float(np.abs(sim.pool.velocity.numpy()).max()), float(sim.scene.dt.numpy()[0])
             return {"shift": sim.config.shifting * dt * speed / sim.scene.spacing * sim.solver.num.h}
         if self.method != "pbd":
             return {}
-        masses = sim.pool.mass.numpy()
-        step = DAMPED * sim.scene.spacing / 2.0  # that a bond between equals takes when it is off by a spacing
-        least = {"pushes[4:5]": 1.0, "stretch.correction": step, "bonds.multiplier": step * masses[masses > 0].min()}
-        if not sim.scene.flowing:
-            return least
-        modulus, density = (float(sim.scene.phases.numpy()[key].max()) for key in ("shear_modulus", "density"))
-        dt = float(sim.scene.dt.numpy()[0])
-        acts = conveyed_modulus(modulus, sim.config.shear_stiffness, density, sim.scene.spacing, dt)
-        return least | {"pulling[7:16]": acts}
+        stiffness = float(sim.scene.phases.numpy()["shear_modulus"].max())
+        return {"pushes[4:5]": 1.0, "pulling[4:13]": max(stiffness, 1e-30)}
 
     def equalise(self) -> None:
         """Give Taichi's twin the state of Warp's."""
@@ -135,6 +121,8 @@ class Twins:
                 values *= rng.uniform(0.97, 1.03, values.shape).astype(np.float32)
             elif name in ("elastic_normal", "elastic_shear"):
                 values += rng.normal(0.0, 0.02, values.shape).astype(np.float32)
+            elif name == "kept":
+                values = rng.uniform(0.0, 1.0, values.shape).astype(np.float32)
             if values.dtype.kind == "f":
                 values[~active] = GARBAGE
             array.assign(values)
@@ -156,31 +144,24 @@ class Twins:
 
     def _passes(self) -> Iterator[tuple[str, Callable[[Any], None]]]:
         """The solver's passes and what else it launches, in the order in which they depend on each other."""
-        scene, network = self.warp.scene, getattr(self.warp.solver, "network", None)
+        solver = self.warp.solver
         if self.method == "mpm":
             yield "refresh", lambda solver: solver.refresh()
         skipped = set()
         if self.method == "pbd":
-            skipped |= set() if network is not None else {"bind", "stretch"}
-            skipped |= set() if scene.flowing else {"strain", "pull"}
-            skipped |= set() if scene.flowing else {"pack", "settle"}
-            skipped |= set() if scene.viscous else {"follow"}
+            skipped |= set() if solver.elastic is not None else {"pack", "strain", "pull"}
+            skipped |= set() if solver.viscosity is not None else {"drag", "follow"}
         for name in self.warp.solver.passes:
             if name not in skipped:
                 yield name, lambda solver, name=name: getattr(solver, name)()
-            if name == "stretch" and network is not None:
-                yield "stretch", lambda solver: solver.stretch(1)  # from the multipliers of the first sweep
-                yield "yield_bonds", lambda solver: solver.network.flow()
 
     def differences(self, after: str) -> Iterator[str]:
         """One sentence for every array that is not the same after a pass."""
         if after == "lists":
             yield from self._lists()
-        if after == "bind":
-            yield from self._bonds()
         by_chance = not self.warp.scene.device.is_cpu or self.taichi.target.threads > 1
         for name in self.shared:
-            if (name in BY_CHANCE and by_chance) or (after == "bind" and name in ("bonds.partner", "bonds.rest")):
+            if name in BY_CHANCE and by_chance:
                 continue
             a, b = self.ours[name].numpy(), self.theirs[name].numpy()
             if self.method != "mpm" and (name in ROWS or name == "state"):
@@ -234,21 +215,6 @@ class Twins:
         if wrong:
             odd = first[wrong[0]] ^ second[wrong[0]]
             yield f"neighbours differ for {len(wrong)} particles, such as {wrong[0]} by {odd}"
-
-    def _bonds(self) -> Iterator[str]:
-        """The bonds of each particle, in whatever order its list had."""
-        number = self.ours["bonds.number"].numpy()
-        partners, lengths = [], []
-        for found in (self.ours, self.theirs):
-            partner, rest = (found[f"bonds.{name}"].numpy().reshape(-1, len(number)) for name in ("partner", "rest"))
-            made = np.arange(len(partner))[:, None] < number
-            order = np.argsort(np.where(made, partner, np.iinfo(np.int32).max), axis=0, kind="stable")
-            partners.append(np.take_along_axis(np.where(made, partner, -1), order, 0))
-            lengths.append(np.take_along_axis(np.where(made, rest, 0.0), order, 0))
-        if (partners[0] != partners[1]).any():
-            yield f"bonds.partner differs in {int((partners[0] != partners[1]).sum())} places"
-        elif not np.abs(lengths[0] - lengths[1]).max() <= TOLERANCE * self.warp.scene.spacing:
-            yield "bonds.rest differs"
 
     def _in_reach(self, sim: Simulation) -> dict[int, set[int]]:
         """The entries that each particle finds, itself left out, well within its reach."""

@@ -20,7 +20,7 @@ V = (1.0, 2.0, 4.0)
 def test_kirchhoff_stress_by_hand(ratio):
     """J p and G dev b, and 2 eta min(J, 1) dev D, of a paste that may carry tension."""
     material = {"density": 1000.0, "youngs_modulus": 2.6e4, "viscosity": 3.0}
-    phase = Scene(scenario(material=material))._phase(scenario(material=material).material, 0.0)
+    phase = Scene(scenario(material=material))._phase(scenario(material=material).material)
     g, k = 1e4, 2.6e4 / 1.2
     b, s = np.array([1.1, 0.9, 1.3]), (0.05, -0.1, 0.2)
     c = np.array([[0.5, 1.0, 0.0], [2.0, -0.25, 0.0], [0.0, 4.0, 0.125]])

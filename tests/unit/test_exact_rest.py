@@ -29,6 +29,11 @@ def test_creep_is_the_fastest_length_of_the_last_fifth():
     assert creep(series.iloc[:1], BOX) == {} and creep(series[["time_s", "center_z_m"]], BOX) == {}
 
 
+def test_a_length_creeps_over_what_of_the_time_it_is_known_for():
+    late = rows(bead_width_m=np.where(TIME < 9.0, np.nan, 0.1 + 0.03 * (TIME - 9.0)))
+    assert creep(late, BOX) == {"creep_m_per_s": pytest.approx(0.03)}  # over the last second of two
+
+
 def test_a_length_that_comes_back_has_moved_too():
     assert creep(rows(top_m=0.1 + 0.004 * (TIME == 9.0)), BOX) == {"creep_m_per_s": pytest.approx(0.002)}
 
@@ -86,6 +91,13 @@ def test_rest_is_believed_after_the_time_in_which_what_nothing_holds_goes_by_a_s
     assert patience(made, 0.1) == pytest.approx(seconds, rel=1e-4)
     for share, rests in ((0.99, False), (1.01, True)):
         assert at_rest(rows(time_s=TIME * 0.5 * share * seconds), made) is (rests or not seconds)
+
+
+def test_matter_that_cures_rests_as_soon_as_fresh_matter_would_show_that_it_does_not():
+    """What a thousandfold viscosity would need to sink by a spacing, no run waits for."""
+    fresh = {"density": 1000.0, "viscosity": 1e3}
+    cures = fresh | {"cure": {"kind": "linear", "time": 0.1, "viscosity": 1e6}}
+    assert patience(scenario(material=cures), 0.1) == patience(scenario(material=fresh), 0.1)
 
 
 @pytest.mark.parametrize(

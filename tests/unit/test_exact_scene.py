@@ -46,7 +46,6 @@ NAMES = (
     "tait",
     "tension_limit",
     "wave_speed",
-    "cure",
 )
 
 
@@ -72,7 +71,6 @@ def test_the_phase_of_a_paste():
             "tait": 0.0,
             "tension_limit": 1e30,
             "wave_speed": math.sqrt((k + 4e4 / 3) / 1000.0),
-            "cure": 0.0,
         }
     )
 
@@ -92,7 +90,7 @@ def test_the_phase_of_liquids():
 def test_cure_makes_a_row_a_level_and_worlds_follow_one_another():
     cure = {"kind": "stages", "time": 1.0, "stages": 4, "youngs_modulus": 5.2e4}
     table = rows(PASTE | {"cure": cure}, PASTE | {"cure": cure, "yield_stress": 70.0})
-    assert len(table) == 10 and [row["cure"] for row in table] == [0.0, 0.25, 0.5, 0.75, 1.0] * 2
+    assert len(table) == 10
     assert [row["shear_modulus"] for row in table[:5]] == pytest.approx([1e4, 1.25e4, 1.5e4, 1.75e4, 2e4])
     assert [row["yield_stress"] for row in table] == [50.0] * 5 + [70.0] * 5
 
@@ -118,11 +116,11 @@ def test_worlds_may_differ_in_material_gravity_and_seed_only():
 KINDS = {
     "liquid": ({"density": 1.0}, ()),
     "oil": ({"density": 1.0, "viscosity": 1.0}, ("viscous",)),
-    "paste": ({"density": 1.0, "youngs_modulus": 9.0, "yield_stress": 1.0}, ("elastic", "flowing")),
-    "solid": ({"density": 1.0, "youngs_modulus": 9.0}, ("elastic", "solid")),
+    "paste": ({"density": 1.0, "youngs_modulus": 9.0, "yield_stress": 1.0}, ("elastic",)),
+    "solid": ({"density": 1.0, "youngs_modulus": 9.0}, ("elastic",)),
     "setting": (
         {"density": 1.0, "youngs_modulus": 9.0, "yield_stress": 1.0, "cure": {"yield_stress": 9.0, "viscosity": 1.0}},
-        ("elastic", "solid", "flowing", "viscous", "cures", "changes"),
+        ("elastic", "viscous", "cures", "changes"),
     ),
     "growing": ({"density": 1.0, "expansion": {"ratio": 2.0}}, ("grows", "expands", "changes")),
     "spawning": ({"density": 1.0, "expansion": {"ratio": 2.0, "kind": "spawn"}}, ("expands", "changes")),
@@ -133,21 +131,19 @@ KINDS = {
 def test_what_a_scene_says_of_its_material(kind):
     material, true = KINDS[kind]
     scene = Scene(scenario(material=material))
-    every = ("elastic", "solid", "flowing", "viscous", "cures", "grows", "expands", "changes")
+    every = ("elastic", "viscous", "cures", "grows", "expands", "changes")
     assert tuple(name for name in every if getattr(scene, name)) == true
     assert Scene([scenario(), scenario(material=KINDS["oil"][0])]).viscous and scene.lanes == 1
 
 
 def test_solid_is_what_never_flows():
     scene = Scene(scenario(material=PASTE))
-    (phase,) = scene.phases.numpy().ravel()
 
     def solid(shear, stress, rate):
-        made = type(scene._phase(scene.scenario.material, 0.0))()
+        made = type(scene._phase(scene.scenario.material))()
         made.shear_modulus, made.yield_stress, made.relaxation_rate = shear, stress, rate
         return bool(is_solid(made))
 
-    assert phase["cure"] == 0.0
     assert solid(5.0, 5.0, 0.0) and not solid(5.0, 4.9, 0.0) and not solid(5.0, 9.0, 0.1) and not solid(0.0, 5.0, 0.0)
 
 

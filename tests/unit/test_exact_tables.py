@@ -1,6 +1,7 @@
 """Cells of the tables as they are formatted, and of the page of the printed tower."""
 
 import math
+from dataclasses import replace
 from io import StringIO
 
 import pytest
@@ -79,6 +80,12 @@ def test_errors_are_percents_but_where_they_are_absolute():
     assert table.rows[0] == ["q", "mpm", "1.235", "2", "12.50 %", "relative", "s"]
     assert table.note == "not compared: why\nnot compared: also"
     assert against_reference([finished()]) is None and against_reference([finished(not_compared=["x"])]).rows == []
+
+
+def test_only_an_answer_that_reads_what_still_moves_is_marked():
+    answers = [answer(), replace(answer(), reads="top_m"), replace(answer(), reads="slump")]
+    run = finished(answers=answers, measures={"slump": 1.2345678, "top_m": 1.2345678}, moving=("slump",))
+    assert [row[2] for row in against_reference([run]).rows] == ["1.235", "1.235", "1.235 ~"]
 
 
 def test_criteria_have_a_row_each():

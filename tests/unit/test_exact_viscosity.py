@@ -9,13 +9,14 @@ import warp as wp
 from scipy.integrate import quad
 
 from fluidbench.method.target import Target
-from fluidbench.method.timestep import plan
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import define
 from fluidbench.scenario.numerics import configure
 from solvers.smoothing import drag_weight
 from solvers.viscosity import accuracy
+
+from ..conftest import bead
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
 STUCK = PERIODIC | {"z_lower": "stick", "z_upper": "stick"}
@@ -24,23 +25,31 @@ SIDE = 8
 METHODS = {"sph": {"viscosity": "implicit"}, "pbd": {}}
 
 
-def made(viscosity=100.0, walls=PERIODIC, jitter=0.0, height=SIDE, **more):
+def made(viscosity=100.0, walls=PERIODIC, jitter=0.0, height=SIDE, spacing=1.0, **more):
+    side = SIDE * spacing
     return define(
         "block",
-        domain={"lower": [0, 0, 0], "upper": [SIDE, SIDE, height], "walls": walls},
+        domain={"lower": [0, 0, 0], "upper": [side, side, height], "walls": walls},
         material={"density": 1000.0, "viscosity": viscosity, "sound_speed": 10.0},
-        bodies=[{"kind": "box", "center": [SIDE / 2, SIDE / 2, height / 2], "size": [SIDE, SIDE, height]}],
+        bodies=[{"kind": "box", "center": [side / 2, side / 2, height / 2], "size": [side, side, height]}],
         gravity=[0.0, 0.0, 0.0],
         duration=1.0,
-        spacing=1.0,
+        spacing=spacing,
         jitter=jitter,
         **more,
     )
 
 
-def block(method, scenario, tolerance=1e-6, threads=1):
+def adrift(viscosity, **more):
+    """The block in free space."""
+    scenario = made(viscosity, **more)
+    around = scenario.domain.model_copy(update={"lower": (-40.0, -40.0, -40.0), "upper": (40.0, 40.0, 40.0)})
+    return scenario.model_copy(update={"domain": around})
+
+
+def block(method, scenario, tolerance=1e-6, threads=1, backend="warp"):
     config = get_method(method).Config(viscous_tolerance=tolerance, **METHODS[method])
-    return Simulation(scenario, method, Target("cpu", "warp", threads), config)
+    return Simulation(scenario, method, Target("cpu", backend, threads), config)
 
 
 def solved(simulation, velocity, dt):
@@ -51,9 +60,14 @@ def solved(simulation, velocity, dt):
     simulation.scene.set_dt(dt)
     solver = simulation.solver
     solver.lists()
-    still = wp.zeros(simulation.pool.size, dtype=wp.vec3)
-    solver.viscosity.solve(still, simulation.pool.velocity, impulse=True)
-    return simulation.pool.velocity.numpy()[: len(velocity)].astype(float), solver.solves()
+    return velocity + dt * acceleration(simulation)[: len(velocity)], solver.solves()
+
+
+def acceleration(simulation):
+    """By viscosity alone [m/s^2]."""
+    still, found = (wp.zeros(simulation.pool.size, dtype=wp.vec3) for _ in range(2))
+    simulation.solver.viscosity.solve(still, found, impulse=False)
+    return found.numpy().astype(float)
 
 
 def noise(simulation, seed=0):
@@ -67,7 +81,7 @@ def test_drag_is_isotropic_in_a_lattice(support):
     r2 = np.maximum((places**2).sum(axis=1), 1e-9)
     w = np.array([drag_weight(min(math.sqrt(v) / support, 1.0), support) for v in r2])
     along, across = (w * places[:, 0] ** 4 / r2).sum(), (w * places[:, 0] ** 2 * places[:, 2] ** 2 / r2).sum()
-    assert 5.0 * across == pytest.approx(1.0, abs=0.04) and 2.5 * (along - across) == pytest.approx(1.0, abs=0.05)
+    assert 5.0 * across == pytest.approx(1.0, abs=0.033) and 2.5 * (along - across) == pytest.approx(1.0, abs=0.033)
     whole, _ = quad(lambda r: drag_weight(r / support, support) * r**4 * 4.0 * math.pi / 15.0, 0.0, support)
     assert whole == pytest.approx(0.2, rel=1e-4)  # of x^2 z^2 / r^2 over all directions
 
@@ -85,12 +99,30 @@ def test_the_operator_is_symmetric_whatever_the_walls(method, walls):
         rows = viscosity.rows.numpy().reshape(-1, 3, 4)
         rows[:n, 1, :3] = direction
         viscosity.rows.assign(rows.reshape(-1, 4))
-        viscosity._apply()
+        viscosity._over_pairs("image")
         images.append(viscosity.image.numpy()[:n].astype(float))
     (ka, kb), scale = images, np.abs(images[0] * b).sum()
     assert (b * ka).sum() == pytest.approx((a * kb).sum(), abs=2e-6 * scale)
     assert (a * ka).sum() >= (a * a).sum()  # drag only takes
     assert np.abs(ka - a).max() > 1.0
+
+
+@pytest.mark.parametrize("strain", [np.diag([0.5, 0.5, -1.0]), [[0, 0, 0.5], [0, 0, 0], [0.5, 0, 0]]])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_free_block_dissipates_what_its_viscosity_says(method, strain):
+    """v . (K - 1) v dt^-1 = 2 mu D:D V of a uniform rate of strain: pairs that are missing at surfaces are made up for
+    (16 % of it in stretching, 27 % in shear, without)."""
+    simulation = block(method, adrift(1e6))
+    x = simulation.frame()["position"].astype(float)
+    v = (x - x.mean(axis=0)) @ np.float64(strain)
+    solved(simulation, v.astype(np.float32), 1e-2)
+    viscosity, n = simulation.solver.viscosity, len(x)
+    rows = viscosity.rows.numpy().reshape(-1, 3, 4)
+    rows[:n, 1, :3] = v
+    viscosity.rows.assign(rows.reshape(-1, 4))
+    viscosity._over_pairs("image")
+    dissipated = 1000.0 * (v * (viscosity.image.numpy()[:n] - v)).sum() / 1e-2
+    assert dissipated == pytest.approx(2.0 * 1e6 * np.square(strain).sum() * SIDE**3, rel=0.12)
 
 
 @pytest.mark.parametrize("viscosity", [1e4, 1e6, 1e8])
@@ -106,9 +138,7 @@ def test_a_solve_keeps_momentum_and_angular_momentum(method, viscosity):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_drop_in_free_flight_keeps_its_turn(method):
-    scenario = made(1e6, jitter=0.2)
-    around = scenario.domain.model_copy(update={"lower": (-40.0, -40.0, -40.0), "upper": (40.0, 40.0, 40.0)})
-    scenario = scenario.model_copy(update={"domain": around})
+    scenario = adrift(1e6, jitter=0.2)
     simulation = block(method, scenario, tolerance=1e-2)
     before = noise(simulation)
     after, _ = solved(simulation, before, 1e-2)
@@ -120,13 +150,13 @@ def test_a_drop_in_free_flight_keeps_its_turn(method):
     assert kept == pytest.approx(spin, abs=1e-4) and went["iterations"] <= 3
 
 
-@pytest.mark.parametrize("reach", [0.1, 10.0, 1000.0])
+@pytest.mark.parametrize(("reach", "scale"), [(0.1, 1.0), (10.0, 1.0), (1000.0, 1.0), (10.0, 1e-5), (10.0, 1e3)])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_shear_wave_falls_as_backward_euler_says(method, reach):
-    """By 1 / (1 + nu k^2 dt) in a step, however long."""
-    height, dt = 32, 1e-2
+def test_a_shear_wave_falls_as_backward_euler_says(method, reach, scale):
+    """By 1 / (1 + nu k^2 dt) in a step, however long, and whatever the spacing."""
+    height, dt = 32 * scale, 1e-2
     k = 2.0 * math.pi / height
-    scenario = made(1000.0 * reach / (k * k * dt), height=height)
+    scenario = made(1000.0 * reach / (k * k * dt), height=height, spacing=scale)
     simulation = block(method, scenario)
     z = simulation.frame()["position"][:, 2]
     before = np.stack([np.sin(k * z), 0 * z, 0 * z], axis=1).astype(np.float32)
@@ -158,19 +188,23 @@ def test_worlds_and_threads_change_nothing(method):
     both.kick(np.concatenate([np.pad(before, ((0, both.pool.capacity - len(before)), (0, 0)))] * 2))
     both.scene.set_dt(1e-2)
     both.solver.lists()
-    still = wp.zeros(both.pool.size, dtype=wp.vec3)
-    both.solver.viscosity.solve(still, both.pool.velocity, impulse=True)
-    assert (both.pool.velocity.numpy()[: len(before)] == expected.astype(np.float32)).all()
+    assert (before + 1e-2 * acceleration(both)[: len(before)] == expected).all()
     assert both.solver.viscosity.effort(0) == went
     assert 0 < both.solver.viscosity.effort(1)["iterations"] < went["iterations"]
 
 
-def test_what_is_no_number_ends_the_iterations():
-    simulation = block("sph", made(1e6))
-    before = noise(simulation)
-    before[3] = np.nan
-    _, went = solved(simulation, before, 1e-2)
-    assert went["iterations"] <= 1
+@pytest.mark.parametrize("backend", ["warp", "taichi"])
+def test_what_is_no_number_ends_the_iterations_and_is_handed_on(backend):
+    """Else viscosity would be gone, and nobody would know: of the operator alone, too."""
+    for hurt in ("velocity", "operator"):
+        simulation = block("sph", made(1e6), backend=backend)
+        before = noise(simulation)
+        if hurt == "velocity":
+            before[3] = np.nan
+        else:
+            simulation.solver.viscosity.num.support = math.nan
+        after, went = solved(simulation, before, 1e-2)
+        assert went["iterations"] == 1 and went["unconverged"] == 1.0 and np.isnan(after).all()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -194,7 +228,7 @@ def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(method):
 
 def test_a_solve_that_may_not_go_on_says_so():
     simulation = block("sph", made(1e7), tolerance=1e-6)
-    simulation.solver.viscosity.num.most = 3
+    simulation.solver.viscosity.ending.most = 3
     _, went = solved(simulation, noise(simulation), 1e-2)
     assert went["iterations"] == 3 and went["unconverged"] == 1.0 and went["residual"] > 1e-6
 
@@ -202,7 +236,7 @@ def test_a_solve_that_may_not_go_on_says_so():
 def test_nothing_is_solved_where_nothing_moves():
     simulation = block("pbd", made())
     after, went = solved(simulation, 0 * noise(simulation), 1e-2)
-    assert not after.any() and went == {"iterations": 0.0, "residual": 0.0, "unconverged": 0.0}
+    assert not after.any() and went == {}
 
 
 @pytest.mark.parametrize(("viscosity", "implicit"), [(0.0, False), (1.0, False), (1e7, True)])
@@ -220,7 +254,11 @@ def test_auto_takes_what_the_bounds_call_cheaper(viscosity, implicit):
 
 
 def test_the_bound_of_accuracy_by_hand():
-    """L = 8 m, nu = 0.1: 0.1 * 64 / (pi^2 0.1) = 6.5 s; of a second's run, 1 ms."""
-    assert accuracy(made(100.0)).dt == pytest.approx(0.1 * 64.0 / (math.pi**2 * 0.1))
-    assert accuracy(made(1e9)).dt == pytest.approx(1e-3)
-    assert plan([accuracy(made(1e9))], 0.01).substeps == 10
+    """L = 8 m, nu = 0.1: 0.1 * 64 / (pi^2 0.1) = 6.5 s; of the time that sqrt(g L) = 4 m/s take across it, 10 ms."""
+    falls = {"gravity": (0.0, 0.0, -2.0)}
+    thin, thick = (made(mu).model_copy(update=falls) for mu in (100.0, 1e9))
+    assert accuracy(thin).dt == pytest.approx(0.1 * 64.0 / (math.pi**2 * 0.1))
+    assert accuracy(thick).dt == pytest.approx(5e-3 * 8.0 / 4.0)
+    assert accuracy(thick.model_copy(update={"duration": 4.0})) == accuracy(thick)
+    nozzle = bead(material={"density": 1000.0, "viscosity": 1e9})
+    assert accuracy(nozzle).dt == pytest.approx(5e-3 * nozzle.nozzle.diameter / nozzle.reference_speed)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Box, Scene
+from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Box
 from solvers import corrected, neighbours
 from solvers.corrected import least_eigenvalue, mirrored_stress, symmetric_inverse
 from solvers.images import (
@@ -21,10 +21,7 @@ from solvers.images import (
     near_faces,
     opposite,
 )
-from solvers.pbd import bonds, walls
-from solvers.pbd.bonds import mirrors_only, nearest_image
-
-from ..conftest import scenario
+from solvers.pbd import walls
 
 wp.set_module_options({"enable_backward": False})
 
@@ -69,23 +66,19 @@ def look(
         numbers[i, axis] = image_code(c, axis)
         numbers[i, 3 + axis] = face_kind(b, c, axis)
     numbers[i, 6] = opposite(c)
-    numbers[i, 7] = mirrors_only(b, c)
-    numbers[i, 8] = int(has_choice(near, c))
+    numbers[i, 7] = int(has_choice(near, c))
 
 
 @wp.kernel
 def invert(
-    b: Box,
     m: wp.array(dtype=wp.mat33),
-    r: wp.array(dtype=wp.vec3),
+    # outputs
     inverse: wp.array(dtype=wp.mat33),
     least: wp.array(dtype=float),
-    way: wp.array(dtype=wp.vec3),
 ):
     i = wp.tid()
     inverse[i] = symmetric_inverse(m[i])
     least[i] = least_eigenvalue(m[i])
-    way[i] = nearest_image(b, r[i])
 
 
 X, GRADIENT = np.array([0.25, 0.5, 3.0]), np.arange(1.0, 10.0).reshape(3, 3)
@@ -94,7 +87,7 @@ X, GRADIENT = np.array([0.25, 0.5, 3.0]), np.arange(1.0, 10.0).reshape(3, 3)
 def seen(b, *codes, near=(7, 7, 7)):
     """(vectors, matrices, numbers) of each code, see `look`."""
     n = len(codes)
-    out = [wp.zeros((n, 4), dtype=wp.vec3), wp.zeros((n, 1), dtype=wp.mat33), wp.zeros((n, 9), dtype=int)]
+    out = [wp.zeros((n, 4), dtype=wp.vec3), wp.zeros((n, 1), dtype=wp.mat33), wp.zeros((n, 8), dtype=int)]
     wp.launch(
         look,
         n,
@@ -104,12 +97,12 @@ def seen(b, *codes, near=(7, 7, 7)):
     return [array.numpy() for array in out]
 
 
-def inverted(*matrices, r=(0.0, 0.0, 0.0), b=None):
-    """(inverse, least eigenvalue, shortest way) of each matrix."""
+def inverted(*matrices):
+    """(inverse, least eigenvalue) of each matrix."""
     n = len(matrices)
-    out = [wp.zeros(n, dtype=wp.mat33), wp.zeros(n, dtype=float), wp.zeros(n, dtype=wp.vec3)]
+    out = [wp.zeros(n, dtype=wp.mat33), wp.zeros(n, dtype=float)]
     given = wp.array(np.array(matrices, np.float32).reshape(n, 3, 3), dtype=wp.mat33)
-    wp.launch(invert, n, [b or box(SLIP, SLIP, SLIP), given, wp.array([r] * n, dtype=wp.vec3)], out)
+    wp.launch(invert, n, [given], out)
     return [array.numpy() for array in out]
 
 
@@ -128,7 +121,6 @@ def test_images_in_each_face(axis, kind):
         assert list(numbers[:3]) == choices
         assert list(numbers[3:6]) == [kind if a == axis else PERIODIC for a in range(3)]
         assert numbers[6] == code_of(*[(3 - c) % 3 for c in choices])
-        assert numbers[7] == {SLIP: code_of(*choices), PERIODIC: 0}.get(kind, -1)
         one = np.array([-1.0 if a == axis else 1.0 for a in range(3)])
         turned = {SLIP: one, FRICTION: one, STICK: -np.ones(3), PERIODIC: np.ones(3)}[kind]
         normal = np.ones(3) if kind == PERIODIC else one
@@ -143,11 +135,9 @@ def test_images_in_corners_combine():
     assert (
         x == pytest.approx([-0.25, 3.5, -2.0]) and v.tolist() == [1.0, -2.0, -4.0] and g.tolist() == [-1.0, -2.0, 4.0]
     )
-    assert list(numbers) == [1, 2, 1, SLIP, STICK, PERIODIC, code_of(2, 1, 2), -1, 1]
+    assert list(numbers) == [1, 2, 1, SLIP, STICK, PERIODIC, code_of(2, 1, 2), 1]
     assert pull.tolist() == (np.array([-1, 1, 1]) * V).tolist()
     assert stress == pytest.approx(np.outer([-1, 1, 1], [-1, 1, 1]) * GRADIENT)
-    _, _, numbers = (rows[0] for rows in seen(box(SLIP, PERIODIC, SLIP), code_of(1, 2, 2)))
-    assert numbers[7] == code_of(1, 0, 2)
 
 
 def test_the_upper_wall_has_its_own_kind():
@@ -158,9 +148,9 @@ def test_the_upper_wall_has_its_own_kind():
 
 
 def test_codes_use_faces_that_are_near():
-    allowed = seen(box(SLIP, SLIP, SLIP), *range(27), near=(5, 4, 7))[2][:, 8]
+    allowed = seen(box(SLIP, SLIP, SLIP), *range(27), near=(5, 4, 7))[2][:, 7]
     assert set(np.flatnonzero(allowed)) == {code_of(a, 0, c) for a in (0, 1) for c in (0, 1, 2)}
-    allowed = seen(box(SLIP, SLIP, SLIP), *range(27), near=(4, 6, 4))[2][:, 8]
+    allowed = seen(box(SLIP, SLIP, SLIP), *range(27), near=(4, 6, 4))[2][:, 7]
     assert set(np.flatnonzero(allowed)) == {code_of(0, b, 0) for b in (0, 2)}
 
 
@@ -219,7 +209,7 @@ def test_a_moment_is_inverted_where_it_is_sound_and_left_where_it_is_not():
         return np.diag([1.0, 1.0, (2 - 2 * least - 2 * math.sqrt(1 - 2 * least)) / least])
 
     full = np.array([[0.5, 0.1, 0.0], [0.1, 0.75, 0.2], [0.0, 0.2, 1.0]])
-    inverse, least, _ = inverted(full, thin(0.1), thin(0.079), thin(0.121))
+    inverse, least = inverted(full, thin(0.1), thin(0.079), thin(0.121))
     assert least == pytest.approx([4 * np.linalg.det(full) / 2.25**2, 0.1, 0.079, 0.121], rel=1e-4)
     assert inverse[0] == pytest.approx(np.linalg.inv(full), rel=1e-5)
     assert inverse[1] == pytest.approx(0.5 * np.linalg.inv(thin(0.1)) + 0.5 * np.eye(3), rel=1e-3)
@@ -232,37 +222,9 @@ def test_stress_of_an_elastic_tensor_by_hand():
     assert got == pytest.approx(np.array([[-14.0, 1.0, 0.5], [1.0, -12.0, 0.25], [0.5, 0.25, -4.0]]))
 
 
-# --- bonds and rubbing of PBD
-
-
-def test_a_bond_goes_the_short_way_round():
-    b = box(SLIP, PERIODIC, SLIP)
-    for r, short in (((0.9, 2.0, 4.0), (0.9, -1.0, 4.0)), ((0.9, -1.4, 4.0),) * 2, ((0.9, -1.6, 4.0), (0.9, 1.4, 4.0))):
-        assert inverted(np.eye(3), r=r, b=b)[2][0] == pytest.approx(short)
-
-
-def test_the_stiffness_of_a_bond_is_the_mean_of_its_ends():
-    scene = Scene(scenario())
-
-    def phase(youngs):
-        return scene._phase(
-            scenario(material={"density": 1.0, "youngs_modulus": youngs, "poisson_ratio": 0.25}).material, 0.0
-        )
-
-    assert bonds.youngs_between(phase(100.0), phase(300.0)) == pytest.approx(200.0)
-    paste = scenario(material={"density": 1.0, "youngs_modulus": 100.0, "yield_stress": 1.0}).material
-    for cure, holds in ((0.0, False), (0.49, False), (0.5, True), (1.0, True)):
-        assert bool(bonds.bonded(scene._phase(paste, cure))) is holds
-    assert bonds.bonded(phase(1.0)) and not bonds.bonded(scene._phase(scenario().material, 1.0))
+# --- rubbing of PBD
 
 
 def test_what_rubs_on_a_face():
-    table = {
-        (FRICTION, 0.9, False): True,
-        (FRICTION, 1.1, False): False,
-        (STICK, 0.9, False): False,
-        (STICK, 0.9, True): True,
-        (SLIP, 0.9, True): False,
-        (STICK, 1.1, True): False,
-    }
-    assert {key: bool(walls.rubbing(int(key[0]), key[1], 1.0, key[2])) for key in table} == table
+    table = {(FRICTION, 0.9): True, (FRICTION, 1.1): False, (STICK, 0.9): False, (SLIP, 0.9): False}
+    assert {key: bool(walls.rubbing(int(key[0]), key[1], 1.0)) for key in table} == table

@@ -27,13 +27,6 @@ def test_wendland_gradient_moment():
     assert moment == pytest.approx(1.0, abs=1e-8)
 
 
-def test_poly6_is_normalised_and_has_the_second_moment_of_validation_c():
-    H = 0.9
-    assert volume_integral(lambda r: smoothing.poly6(r * r, H), H) == pytest.approx(1.0, abs=1e-8)
-    second = volume_integral(lambda r: smoothing.poly6(r * r, H) * r * r / 3, H)
-    assert second == pytest.approx(H * H / 11, rel=1e-6)
-
-
 def test_spiky_gradient_integrates_to_minus_three():
     """Integral of r W' over space is -3 by parts."""
     H = 0.9

@@ -1,0 +1,260 @@
+"""Conjugate gradients in Warp: what they ask of particles, and of the sums over a world. All that decides how long they
+go on stays on the device (viscosity.py).
+
+The direction is in rows for the operator to read: the first three of a particle's second four floats, in three fours.
+"""
+
+import warp as wp
+
+from fluidbench.method.frame import FREE
+from fluidbench.native.crew import index_of, raise_fault
+from fluidbench.native.vector_access import joined, load_vec4, store_vec4
+
+wp.set_module_options({"enable_backward": False})  # no fast math: what is no number must end the iterations
+
+CHUNK = wp.constant(8)  # particles whose sums one thread adds up: results are the same on any number of threads
+TEAM = 32  # threads of a GPU that add up a world's chunks
+
+
+@wp.struct
+class Ending:
+    """When a solve ends."""
+
+    tolerance: float  # of the residual over v*
+    most: int  # iterations
+
+
+@wp.struct
+class Totals:
+    """Sums over a world, and what follows from them."""
+
+    left: float  # m r.r, r being the residual
+    right: float  # m v*.v*
+    step: float  # alpha
+    turn: float  # beta
+    iterations: float  # of this solve
+
+
+@wp.kernel
+def residual_of(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    mass: wp.array(dtype=float),
+    aim: wp.array(dtype=wp.vec3),
+    image: wp.array(dtype=wp.vec3),
+    # outputs
+    residual: wp.array(dtype=wp.vec3),
+    rows: wp.array(dtype=wp.vec4),
+    partial: wp.array(dtype=wp.vec2),
+):
+    """r = v* - K v, the first direction; sums of m r.r and of m v*.v*."""
+    chunk = index_of(share, wp.tid())
+    first = chunk * CHUNK
+    world = first / capacity
+    left, right = float(0.0), float(0.0)
+    for lane in range(CHUNK):
+        i = first + lane
+        if i - world * capacity < count[world]:
+            r = wp.vec3(0.0, 0.0, 0.0)
+            if held[i] == FREE:
+                r = aim[i] - image[i]
+            residual[i] = r
+            row = load_vec4(rows, 3 * i + 1)
+            store_vec4(rows, 3 * i + 1, wp.vec4(r[0], r[1], r[2], row[3]))
+            left += mass[i] * wp.dot(r, r)
+            right += mass[i] * wp.dot(aim[i], aim[i])
+    partial[chunk] = wp.vec2(left, right)
+
+
+@wp.kernel
+def along(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    mass: wp.array(dtype=float),
+    rows: wp.array(dtype=wp.vec4),
+    image: wp.array(dtype=wp.vec3),
+    # outputs
+    partial: wp.array(dtype=wp.vec2),
+):
+    """Sums of m p.Kp."""
+    chunk = index_of(share, wp.tid())
+    first = chunk * CHUNK
+    world = first / capacity
+    total = float(0.0)
+    for lane in range(CHUNK):
+        i = first + lane
+        if i - world * capacity < count[world]:
+            p = load_vec4(rows, 3 * i + 1)
+            total += mass[i] * wp.dot(wp.vec3(p[0], p[1], p[2]), image[i])
+    partial[chunk] = wp.vec2(total, 0.0)
+
+
+@wp.kernel
+def descend(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    mass: wp.array(dtype=float),
+    rows: wp.array(dtype=wp.vec4),
+    image: wp.array(dtype=wp.vec3),
+    totals: wp.array(dtype=Totals),
+    # outputs
+    trial: wp.array(dtype=wp.vec3),
+    residual: wp.array(dtype=wp.vec3),
+    partial: wp.array(dtype=wp.vec2),
+):
+    """v += alpha p, r -= alpha K p; sums of m r.r."""
+    chunk = index_of(share, wp.tid())
+    first = chunk * CHUNK
+    world = first / capacity
+    step = totals[world].step
+    total = float(0.0)
+    for lane in range(CHUNK):
+        i = first + lane
+        if i - world * capacity < count[world]:
+            p = load_vec4(rows, 3 * i + 1)
+            trial[i] = trial[i] + step * wp.vec3(p[0], p[1], p[2])
+            r = residual[i] - step * image[i]
+            residual[i] = r
+            total += mass[i] * wp.dot(r, r)
+    partial[chunk] = wp.vec2(total, 0.0)
+
+
+@wp.kernel
+def turn(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    totals: wp.array(dtype=Totals),
+    residual: wp.array(dtype=wp.vec3),
+    # outputs
+    rows: wp.array(dtype=wp.vec4),
+):
+    """p = r + beta p."""
+    i = index_of(share, wp.tid())
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        p = load_vec4(rows, 3 * i + 1)
+        r = residual[i]
+        beta = totals[world].turn
+        store_vec4(rows, 3 * i + 1, wp.vec4(r[0] + beta * p[0], r[1] + beta * p[1], r[2] + beta * p[2], p[3]))
+
+
+@wp.func
+def summed(partial: wp.array(dtype=wp.vec2), first: int, chunks: int, member: int, team: int):
+    """The sum over a world's chunks, in double precision until threads join theirs."""
+    left, right = wp.float64(0.0), wp.float64(0.0)
+    for k in range(member, chunks, team):
+        value = partial[first + k]
+        left += wp.float64(value[0])
+        right += wp.float64(value[1])
+    return wp.vec2(joined(float(left), team), joined(float(right), team))
+
+
+@wp.func
+def unsolved(end: Ending, left: float, right: float):
+    """Whether m r.r is too much beside m v*.v*; what is no number is: an iteration hands it on to the velocities."""
+    return not (left <= end.tolerance * end.tolerance * right)
+
+
+@wp.kernel
+def weigh_start(
+    end: Ending,
+    chunks: int,
+    team: int,
+    partial: wp.array(dtype=wp.vec2),
+    # outputs
+    totals: wp.array(dtype=Totals),
+    going: wp.array(dtype=int),
+):
+    """m r.r and m v*.v*, and whether there is anything to solve. `going` was 0."""
+    thread = wp.tid()
+    world = thread / team
+    found = summed(partial, world * chunks, chunks, thread - world * team, team)
+    if thread == world * team:
+        total = Totals()
+        total.left = found[0]
+        total.right = found[1]
+        totals[world] = total
+        if unsolved(end, found[0], found[1]):
+            raise_fault(going, 1)
+
+
+@wp.kernel
+def weigh_step(
+    end: Ending,
+    chunks: int,
+    team: int,
+    partial: wp.array(dtype=wp.vec2),
+    # outputs
+    totals: wp.array(dtype=Totals),
+    going: wp.array(dtype=int),
+):
+    """alpha = m r.r / m p.Kp; none where a world is done."""
+    thread = wp.tid()
+    world = thread / team
+    found = summed(partial, world * chunks, chunks, thread - world * team, team)
+    if thread == world * team:
+        total = totals[world]
+        total.step = 0.0
+        if unsolved(end, total.left, total.right):
+            total.iterations = total.iterations + 1.0
+            total.step = total.left / found[0]
+        totals[world] = total
+    if thread == 0:
+        going[0] = 0
+
+
+@wp.kernel
+def weigh_turn(
+    end: Ending,
+    chunks: int,
+    team: int,
+    partial: wp.array(dtype=wp.vec2),
+    # outputs
+    totals: wp.array(dtype=Totals),
+    going: wp.array(dtype=int),
+):
+    """beta, and whether to go on."""
+    thread = wp.tid()
+    world = thread / team
+    found = summed(partial, world * chunks, chunks, thread - world * team, team)
+    if thread == world * team:
+        total = totals[world]
+        total.turn = 0.0
+        if total.step != 0.0:
+            total.turn = found[0] / total.left
+            total.left = found[0]
+            number = found[0] >= 0.0
+            if number and unsolved(end, found[0], total.right) and total.iterations < float(end.most):
+                raise_fault(going, 1)
+        totals[world] = total
+
+
+@wp.kernel
+def note(
+    end: Ending,
+    totals: wp.array(dtype=Totals),
+    # outputs
+    going: wp.array(dtype=int),
+    counted: wp.array2d(dtype=int),
+    worst: wp.array(dtype=float),
+):
+    """Of each world in which anything moves: solves, iterations, those that did not converge; the largest residual over
+    v*."""
+    world = wp.tid()
+    total = totals[world]
+    if total.right != 0.0:
+        counted[world, 0] = counted[world, 0] + 1
+        counted[world, 1] = counted[world, 1] + int(total.iterations)
+        if unsolved(end, total.left, total.right):
+            counted[world, 2] = counted[world, 2] + 1
+        worst[world] = wp.max(worst[world], wp.sqrt(total.left / total.right))
+    if world == 0:
+        going[0] = 0
+
+
+KERNELS = (residual_of, along, descend, turn, weigh_start, weigh_step, weigh_turn, note)

@@ -1,0 +1,166 @@
+"""Elastic stress of position-based dynamics in Taichi: the passes of elastic_warp.py with the same arguments, written
+anew from the same equations."""
+
+from fluidbench.method.frame import CARRIED, FREE
+
+from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
+from ..flow_taichi import pressure, strained
+from ..neighbours_taichi import BoxT, ListsT, image_velocity
+from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, symmetric_at, vector_at, vector_into, writer
+from ..smoothing import spiky_slope
+from ..taichi_bridge import (
+    Floats,
+    Ints,
+    Phases,
+    Quads,
+    Vectors,
+    is_solid,
+    mat3,
+    phase_at,
+    rest_density,
+    struct_of,
+    taichi_func,
+    ti,
+    vec4,
+)
+from .numbers import MOVING, PULLING, Numbers
+
+NumbersT = struct_of(Numbers)
+gradient = taichi_func(spiky_slope)
+moving_of, pulling_of = reader(MOVING), reader(PULLING)
+write_pulling = writer(PULLING)
+
+
+@ti.kernel
+def pack(capacity: int, count: Ints, position: Vectors, volume: Floats, velocity: Vectors, moving: Quads):
+    for i in range(position.shape[0]):
+        if i % capacity < count[i // capacity]:
+            x, v = position[i], velocity[i]
+            moving[2 * i] = vec4(x[0], x[1], x[2], volume[i])
+            moving[2 * i + 1] = vec4(v[0], v[1], v[2], 0.0)
+
+
+@ti.func
+def sloping(num, other, r):
+    """V_j grad W, over the kernel's normalisation."""
+    return other[3] * gradient(r.norm(), num.support) / ti.max(r.norm(), 1.0e-9) * r
+
+
+@ti.func
+def moving_seen(box, extra: ti.template(), row, j, code):
+    return vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
+
+
+@ti.func
+def pulling_seen(box, extra: ti.template(), row, j, code):
+    return matrix_into(row, 4, mirrored_stress(box, stressed(row, 4), code))
+
+
+@ti.func
+def strain_pair(num, own, begun, other, r):
+    g = sloping(num, other, r)
+    square = -g.outer_product(r)
+    sums = matrix_into(ti.Vector.zero(ti.f32, 15), 0, -(vector_at(own, 4) - vector_at(other, 4)).outer_product(g))
+    sums = vector_into(sums, 9, ti.math.vec3(square[0, 0], square[1, 1], square[2, 2]))
+    return vector_into(sums, 12, ti.math.vec3(square[0, 1], square[0, 2], square[1, 2]))
+
+
+strained_by = over_pairs(MOVING, 15, strain_pair, moving_seen)
+
+
+@ti.kernel
+def strain(
+    num: NumbersT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    inside: Ints,
+    capacity: int,
+    count: Ints,
+    rows: Quads,
+    dt: Floats,
+    phases: Phases,
+    phase_of: Ints,
+    held: Ints,
+    mass: Floats,
+    volume: Floats,
+    volume_ratio: Floats,
+    elastic_normal: Vectors,
+    elastic_shear: Vectors,
+    kept: Floats,
+    pulling: Quads,
+    pulled: Vectors,
+    drag: Vectors,
+):
+    for i in range(held.shape[0]):
+        world = i // capacity
+        if i - world * capacity < count[world]:
+            phase = phase_at(phases, world, phase_of[i])
+            own = moving_of(rows, i)
+            carried = mat3(0.0)
+            if phase.shear_modulus > 0.0:
+                sums = strained_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+                correction = symmetric_inverse(symmetric_at(sums, 9))
+                slope = stressed(sums, 0) @ correction
+                slope += dt[world] * slope @ slope
+                spin = 0.5 * dt[world] * (slope - slope.transpose())
+                turned = spin @ drag[i]
+                drag[i] += turned + 0.5 * spin @ turned
+                b, s, share, ratio, push = elastic_normal[i], elastic_shear[i], kept[i], volume_ratio[i], 0.0
+                if held[i] != CARRIED:
+                    b, s, share = strained(phase, phase.shear_modulus, slope, b, s, dt[world])
+                    elastic_normal[i], elastic_shear[i], kept[i] = b, s, share
+                    if is_solid(phase):
+                        ratio *= (ti.Matrix.identity(ti.f32, 3) + dt[world] * slope).determinant()
+                        volume_ratio[i] = ratio
+                if is_solid(phase):
+                    push = pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+                carried = elastic_stress(share * phase.shear_modulus, b, s, push) @ correction
+            row = ti.Vector.zero(ti.f32, PULLING)
+            for c in ti.static(range(4)):
+                row[c] = own[c]
+            write_pulling(pulling, i, matrix_into(row, 4, carried))
+
+
+@ti.func
+def pull_pair(num, own, begun, other, r):
+    return (stressed(own, 4) + stressed(other, 4)) @ sloping(num, other, r)
+
+
+pulled_by = over_pairs(PULLING, 3, pull_pair, pulling_seen)
+
+
+@ti.kernel
+def pull(
+    num: NumbersT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    inside: Ints,
+    capacity: int,
+    count: Ints,
+    rows: Quads,
+    dt: Floats,
+    phases: Phases,
+    phase_of: Ints,
+    held: Ints,
+    mass: Floats,
+    volume: Floats,
+    volume_ratio: Floats,
+    elastic_normal: Vectors,
+    elastic_shear: Vectors,
+    kept: Floats,
+    pulling: Quads,
+    pulled: Vectors,
+    drag: Vectors,
+):
+    for i in range(held.shape[0]):
+        if i % capacity < count[i // capacity] and held[i] == FREE:
+            own = pulling_of(rows, i)
+            sums = pulled_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+            pulled[i] = sums / rest_density(mass, volume, i)
+
+
+KERNELS = {"pack": pack, "strain": strain, "pull": pull}

@@ -1,0 +1,179 @@
+"""Elastic stress of position-based dynamics in Warp: strain by the common law at the end of a substep, and what its
+stress makes of the next.
+
+After XPBI (Yu et al. 2024, arXiv 2405.11694), constraints are on the velocity gradient and flow is part of them: the
+stress at the end of a step is kept (s + 2 G dt dev D), s being that at its beginning and `kept` the share that flow
+leaves of it, last seen. The first term is known, and pulls before density constraints push (`predict`). The second is a
+viscosity, and is solved for with Newton's own (../viscosity.py) in place of sweeps over constraints: backward Euler,
+stable at any stiffness.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from fluidbench.method.frame import CARRIED, FREE
+from fluidbench.native.crew import index_of
+from fluidbench.native.scene import Box, Phase, is_solid
+from fluidbench.native.vector_access import store_vec4
+
+from ..aging import rest_density
+from ..bind import warp_func
+from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
+from ..flow import pressure, strained
+from ..images import image_velocity
+from ..pairs import Pass, floats
+from ..smoothing import spiky_slope
+from .numbers import MOVING, PULLING, Numbers
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+gradient = warp_func(spiky_slope)
+vec15 = floats(15)
+
+
+@wp.struct
+class Straining:
+    """What the passes read and write of a particle itself."""
+
+    dt: wp.array(dtype=float)
+    phases: wp.array2d(dtype=Phase)
+    phase_of: wp.array(dtype=int)
+    held: wp.array(dtype=int)
+    mass: wp.array(dtype=float)
+    volume: wp.array(dtype=float)
+    volume_ratio: wp.array(dtype=float)
+    elastic_normal: wp.array(dtype=wp.vec3)
+    elastic_shear: wp.array(dtype=wp.vec3)
+    kept: wp.array(dtype=float)
+    pulling: wp.array(dtype=wp.vec4)
+    pulled: wp.array(dtype=wp.vec3)
+    drag: wp.array(dtype=wp.vec3)
+
+
+@wp.kernel
+def pack(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    volume: wp.array(dtype=float),
+    velocity: wp.array(dtype=wp.vec3),
+    # outputs
+    moving: wp.array(dtype=wp.vec4),
+):
+    """Rows of velocities."""
+    i = index_of(share, wp.tid())
+    if i % capacity < count[i / capacity]:
+        x, v = position[i], velocity[i]
+        store_vec4(moving, 2 * i, wp.vec4(x[0], x[1], x[2], volume[i]))
+        store_vec4(moving, 2 * i + 1, wp.vec4(v[0], v[1], v[2], 0.0))
+
+
+@wp.func
+def sloping(num: Numbers, volume: float, r: wp.vec3):
+    """V_j grad W"""
+    distance = wp.length(r)
+    return (volume * gradient(distance, num.support) / wp.max(distance, 1.0e-9)) * r
+
+
+@wp.func
+def seen_moving(box: Box, data: Straining, row: floats(MOVING), j: int, code: int):
+    v = image_velocity(box, wp.vec3(row[4], row[5], row[6]), code)
+    for axis in range(3):
+        row[4 + axis] = v[axis]
+    return row
+
+
+@wp.func
+def strain_pair(num: Numbers, own: floats(MOVING + 4), other: floats(MOVING), r: wp.vec3):
+    g = sloping(num, other[3], r)
+    u = wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
+    return vec15(
+        -u[0] * g[0], -u[0] * g[1], -u[0] * g[2],
+        -u[1] * g[0], -u[1] * g[1], -u[1] * g[2],
+        -u[2] * g[0], -u[2] * g[1], -u[2] * g[2],
+        -g[0] * r[0], -g[1] * r[1], -g[2] * r[2], -g[0] * r[1], -g[0] * r[2], -g[1] * r[2],
+    )  # fmt: skip
+
+
+@wp.func
+def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(MOVING + 4), sums: vec15):
+    phase = data.phases[world, data.phase_of[i]]
+    h = data.dt[world]
+    stress = wp.mat33()
+    if phase.shear_modulus > 0.0:
+        moment = wp.mat33(
+            sums[9], sums[12], sums[13], sums[12], sums[10], sums[14], sums[13], sums[14], sums[11]
+        )  # fmt: skip
+        correction = symmetric_inverse(moment)
+        slope = wp.mat33(
+            sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]
+        )  # fmt: skip
+        slope = slope * correction
+        # As seen from where the substep began: (1 - h l)^-1 = 1 + h (l + h l^2) + ..., a rotation where v is its chord.
+        slope += h * slope * slope
+        # The first guess of the next solve turns with the matter, or it has a torque, which no iteration takes away.
+        spin = 0.5 * h * (slope - wp.transpose(slope))
+        turned = spin * data.drag[i]
+        data.drag[i] = data.drag[i] + turned + 0.5 * (spin * turned)
+        b = data.elastic_normal[i]
+        s = data.elastic_shear[i]
+        ratio = data.volume_ratio[i]
+        push = float(0.0)
+        if data.held[i] != CARRIED:
+            b, s, kept = strained(phase, phase.shear_modulus, slope, b, s, h)
+            data.elastic_normal[i] = b
+            data.elastic_shear[i] = s
+            data.kept[i] = kept
+            if is_solid(phase):
+                ratio *= wp.determinant(wp.identity(n=3, dtype=float) + h * slope)
+                data.volume_ratio[i] = ratio
+        if is_solid(phase):
+            push = pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+        stress = elastic_stress(data.kept[i] * phase.shear_modulus, b, s, push) * correction
+    store_vec4(data.pulling, 4 * i, wp.vec4(own[0], own[1], own[2], own[3]))
+    store_vec4(data.pulling, 4 * i + 1, wp.vec4(stress[0, 0], stress[0, 1], stress[0, 2], stress[1, 0]))
+    store_vec4(data.pulling, 4 * i + 2, wp.vec4(stress[1, 1], stress[1, 2], stress[2, 0], stress[2, 1]))
+    store_vec4(data.pulling, 4 * i + 3, wp.vec4(stress[2, 2], 0.0, 0.0, 0.0))
+
+
+strain = Pass(Numbers, Straining, MOVING, 15, strain_pair, strain_finish, seen=seen_moving)
+"""Elastic strain after the substep by the common law, and its stress times the correction of gradients. The volume of
+what flows is the density constraint's; only a solid's is elastic. Sums: velocity gradient (9), moment (6)."""
+
+
+@wp.func
+def stress_of(row: Any, first: int):
+    return wp.mat33(
+        row[first], row[first + 1], row[first + 2],
+        row[first + 3], row[first + 4], row[first + 5],
+        row[first + 6], row[first + 7], row[first + 8],
+    )  # fmt: skip
+
+
+@wp.func
+def seen_pulling(box: Box, data: Straining, row: floats(PULLING), j: int, code: int):
+    t = mirrored_stress(box, stress_of(row, 4), code)
+    for a in range(3):
+        for b in range(3):
+            row[4 + 3 * a + b] = t[a, b]
+    return row
+
+
+@wp.func
+def pull_pair(num: Numbers, own: floats(PULLING + 4), other: floats(PULLING), r: wp.vec3):
+    return (stress_of(own, 4) + stress_of(other, 4)) * sloping(num, other[3], r)
+
+
+@wp.func
+def pull_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(PULLING + 4), sums: wp.vec3):
+    if data.held[i] == FREE:
+        data.pulled[i] = sums / rest_density(data.mass, data.volume, i)
+
+
+pull = Pass(Numbers, Straining, PULLING, 3, pull_pair, pull_finish, seen=seen_pulling)
+"""Acceleration by the stress of the particle and its neighbours."""
+
+KERNELS = (pack,)
+ELASTIC = {"strain": strain, "pull": pull}
