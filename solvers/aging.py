@@ -8,7 +8,7 @@ Growth: rest volume grows while the present volume stays, so fresh foam is under
 import warp as wp
 
 from fluidbench.native.crew import index_of
-from fluidbench.native.scene import Phase
+from fluidbench.native.scene import Phase, is_solid
 
 from . import constitutive
 from .bind import warp_func
@@ -90,6 +90,29 @@ def swell_at_volume(
         factor = wp.exp(growth[i] * dt[world])
         volume[i] = volume[i] * factor
         volume_ratio[i] = volume_ratio[i] / factor
+
+
+@wp.kernel
+def swell_by_phase(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    growth: wp.array(dtype=float),
+    # outputs
+    volume: wp.array(dtype=float),
+    volume_ratio: wp.array(dtype=float),
+):
+    """The same for a method that integrates J of solids alone."""
+    i = index_of(share, wp.tid())
+    world = i / capacity
+    if i - world * capacity < count[world] and growth[i] > 0.0:
+        factor = wp.exp(growth[i] * dt[world])
+        volume[i] = volume[i] * factor
+        if is_solid(phases[world, phase_of[i]]):
+            volume_ratio[i] = volume_ratio[i] / factor
 
 
 @wp.func

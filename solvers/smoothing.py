@@ -27,6 +27,19 @@ def drag_weight(q: float, support: float):
     return 339.204 / s * t * t * t * sqrt(t) * q * q  # in this order 0 for what lies ever so far
 
 
+def cusp(r: float, support: float):
+    """Quadratic kernel [1/m^3], support H: a peak that keeps particles from clumping, as a density's weight. Clavet et
+    al. 2005."""
+    t = max(1.0 - r / support, 0.0)
+    return 15.0 / (2.0 * pi * support * support * support) * t * t
+
+
+def cusp_slope(r: float, support: float):
+    """(dW/dr) [1/m^4] of the quadratic kernel, support H."""
+    t = max(1.0 - r / support, 0.0)
+    return -15.0 / (pi * support * support * support * support) * t
+
+
 def spiky(r: float, support: float):
     """Spiky kernel [1/m^3], support H: its peak keeps particles from clumping. Desbrun & Gascuel 1996."""
     d = max(support - r, 0.0)

@@ -13,10 +13,13 @@ f^2 = sum_j V_j w r^2 / 3 is a particle's fullness, 1 within matter: at a free s
 are missing, and each that is there stands for more. (A block of 10 particles to a side resists stretching 13 % and
 shear 22 % too little without it, 8 % too much and 7 % too little with it; all fall with 1 / n.)
 
-The mass is the preconditioner: every direction is then a sum of forces between pairs, which keeps momentum and angular
-momentum whatever the residual. The first guess, the viscous acceleration of the step before, keeps momentum only: it
-has a torque where matter has turned since. Iterations end when the
+Matter that grows at a rate g (d ln V / dt) moves apart by itself: u is then what it has beyond g r / 3, or pairs would
+resist growth as a bulk viscosity of 5/3 mu.
+
+The first guess is the viscous acceleration of the step before, the mass the preconditioner. Iterations end when the
 root mean square of v* - K v, weighed by mass, is `tolerance` times that of v*; all that decides it stays on the device.
+The velocity that is handed on is v* - (K v - v), by the forces between pairs at the v that was found: these keep
+momentum and angular momentum whatever the residual.
 """
 
 from __future__ import annotations
@@ -134,12 +137,15 @@ class ImplicitViscosity:
         self._particles("open_solve", [*common, *matter], [self.aim, self.trial, self.rows])
         self._over_pairs("fullness")
         self._over_pairs("image")
+        if scene.grows:
+            self._particles("give_growth", [pool.growth], [self.rows])
+            self._over_pairs("growing")
         inputs = [pool.held, pool.mass, self.aim, self.image]
         self._particles("residual_of", inputs, [self.residual, self.rows, self.partial], self.chunks)
         self._weigh("weigh_start")
         self.backend.repeat(self.going, self._iterate)
         self._launch("note", len(scene.scenarios), [self.ending, self.totals], [self.going, self.counted, self.worst])
-        ends = [scene.dt, pool.held, self.aim, self.trial, int(impulse)]
+        ends = [scene.dt, pool.held, self.aim, self.trial, self.residual, int(impulse)]
         self._particles("close_solve", ends, [self.drag, target])
 
     def _iterate(self) -> None:

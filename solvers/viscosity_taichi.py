@@ -53,14 +53,35 @@ def seen(box, extra: ti.template(), row, j, code):
 
 
 @ti.func
-def pair(num, own, begun, other, r):
-    u, s, r2 = vector_at(own, 4) - vector_at(other, 4), vector_at(other, 9) * r, r.norm_sqr()
+def seen_growing(box, extra: ti.template(), row, j, code):
+    out = row
+    for axis in ti.static(range(3)):
+        if face_kind(box, code, axis) == STICK:
+            out[9 + axis] = -out[9 + axis]
+    return out
+
+
+@ti.func
+def pull_of(num, own, other, r, u):
+    """What j does to i while they move apart at u, twice over."""
+    s, r2 = vector_at(other, 9) * r, r.norm_sqr()
     viscosity = 2.0 * own[7] * other[7] / ti.max(own[7] + other[7], 1.0e-30)
     drag = 5.0 * viscosity / (own[8] * other[8] * ti.max(r2, 1.0e-6 * num.support * num.support))
     return -near(num, other, r2) * drag * (r.dot(u) * r + s.dot(u) * s)
 
 
+@ti.func
+def pair(num, own, begun, other, r):
+    return pull_of(num, own, other, r, vector_at(own, 4) - vector_at(other, 4))
+
+
+@ti.func
+def growing_pair(num, own, begun, other, r):
+    return pull_of(num, own, other, r, (own[4] + other[4]) / 6.0 * r)
+
+
 summed_over = over_pairs(DIRECTION, 3, pair, seen)
+growing_over = over_pairs(DIRECTION, 3, growing_pair, seen_growing)
 fullness_over = over_pairs(DIRECTION, 1, fullness_pair)
 
 
@@ -118,6 +139,32 @@ def image(
             found[i] = out
 
 
+@ti.kernel
+def growing(
+    num: ViscousT,
+    box: BoxT,
+    lists: ListsT,
+    entries: Ints,
+    number: Ints,
+    inside: Ints,
+    capacity: int,
+    count: Ints,
+    rows: Quads,
+    dt: Floats,
+    held: Ints,
+    mass: Floats,
+    volume: Floats,
+    written: Quads,
+    found: Vectors,
+):
+    for i in range(held.shape[0]):
+        world = i // capacity
+        if i - world * capacity < count[world] and held[i] == FREE:
+            own = direction_at(rows, i)
+            sums = growing_over(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+            found[i] += dt[world] / rest_density(mass, volume, i) * sums
+
+
 @ti.func
 def resistance(phase, elastic, kept, h):
     """See viscosity_warp.py."""
@@ -163,6 +210,13 @@ def open_solve(
 
 
 @ti.kernel
+def give_growth(capacity: int, count: Ints, growth: Floats, rows: Quads):
+    for i in range(growth.shape[0]):
+        if i % capacity < count[i // capacity]:
+            rows[3 * i + 1] = vec4(growth[i], 0.0, 0.0, rows[3 * i + 1][3])
+
+
+@ti.kernel
 def close_solve(
     capacity: int,
     count: Ints,
@@ -170,6 +224,7 @@ def close_solve(
     held: Ints,
     aim: Vectors,
     trial: Vectors,
+    residual: Vectors,
     impulse: int,
     drag: Vectors,
     target: Vectors,
@@ -177,11 +232,19 @@ def close_solve(
     for i in range(held.shape[0]):
         world = i // capacity
         if i - world * capacity < count[world] and held[i] == FREE:
-            change = trial[i] - aim[i]
+            change = trial[i] + residual[i] - aim[i]
             drag[i] = change / dt[world]
             if impulse == 0:
                 change /= dt[world]
             target[i] += change
 
 
-PASSES = SimpleNamespace(fullness=fullness, image=image, open_solve=open_solve, **KERNELS, close_solve=close_solve)
+PASSES = SimpleNamespace(
+    fullness=fullness,
+    image=image,
+    growing=growing,
+    open_solve=open_solve,
+    give_growth=give_growth,
+    **KERNELS,
+    close_solve=close_solve,
+)

@@ -9,7 +9,7 @@ import warp as wp
 from fluidbench.method.frame import FREE
 from fluidbench.native.crew import index_of
 from fluidbench.native.scene import STICK, Box, Phase, is_solid
-from fluidbench.native.vector_access import store_vec4
+from fluidbench.native.vector_access import load_vec4, store_vec4
 
 from .aging import rest_density
 from .bind import warp_func
@@ -75,8 +75,8 @@ def seen(box: Box, data: Applying, row: floats(DIRECTION), j: int, code: int):
 
 
 @wp.func
-def pair(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), r: wp.vec3):
-    u = wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
+def pull_of(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), r: wp.vec3, u: wp.vec3):
+    """What j does to i while they move apart at u, twice over."""
     s = wp.vec3(other[9] * r[0], other[10] * r[1], other[11] * r[2])
     r2 = wp.dot(r, r)
     viscosity = 2.0 * own[7] * other[7] / wp.max(own[7] + other[7], 1.0e-30)
@@ -85,11 +85,37 @@ def pair(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), r: 
 
 
 @wp.func
+def pair(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), r: wp.vec3):
+    return pull_of(num, own, other, r, wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6]))
+
+
+@wp.func
 def finish(num: Viscous, box: Box, data: Applying, world: int, i: int, own: floats(DIRECTION + 4), sums: wp.vec3):
     image = wp.vec3(0.0, 0.0, 0.0)
     if data.held[i] == FREE:
         image = wp.vec3(own[4], own[5], own[6]) - (data.dt[world] / rest_density(data.mass, data.volume, i)) * sums
     data.image[i] = image
+
+
+@wp.func
+def seen_growing(box: Box, data: Applying, row: floats(DIRECTION), j: int, code: int):
+    for axis in range(3):
+        if face_kind(box, code, axis) == STICK:
+            row[9 + axis] = -row[9 + axis]
+    return row
+
+
+@wp.func
+def growing_pair(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), r: wp.vec3):
+    return pull_of(num, own, other, r, ((own[4] + other[4]) / 6.0) * r)
+
+
+@wp.func
+def growing_finish(
+    num: Viscous, box: Box, data: Applying, world: int, i: int, own: floats(DIRECTION + 4), sums: wp.vec3
+):
+    if data.held[i] == FREE:
+        data.image[i] = data.image[i] + (data.dt[world] / rest_density(data.mass, data.volume, i)) * sums
 
 
 @wp.func
@@ -151,6 +177,22 @@ def open_solve(
 
 
 @wp.kernel
+def give_growth(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    growth: wp.array(dtype=float),
+    # outputs
+    rows: wp.array(dtype=wp.vec4),
+):
+    """Rows with the rate of growth in place of the direction."""
+    i = index_of(share, wp.tid())
+    if i % capacity < count[i / capacity]:
+        viscosity = load_vec4(rows, 3 * i + 1)[3]
+        store_vec4(rows, 3 * i + 1, wp.vec4(growth[i], 0.0, 0.0, viscosity))
+
+
+@wp.kernel
 def close_solve(
     share: wp.vec3i,
     capacity: int,
@@ -159,16 +201,19 @@ def close_solve(
     held: wp.array(dtype=int),
     aim: wp.array(dtype=wp.vec3),
     trial: wp.array(dtype=wp.vec3),
+    residual: wp.array(dtype=wp.vec3),
     impulse: int,
     # outputs
     drag: wp.array(dtype=wp.vec3),
     target: wp.array(dtype=wp.vec3),
 ):
-    """The viscous acceleration, and what it makes of accelerations or, as an impulse, of velocities."""
+    """The viscous acceleration, and what it makes of accelerations or, as an impulse, of velocities. It is that of the
+    forces between pairs at the velocity found, v* - (K v - v): what the residual adds keeps momentum and angular
+    momentum whatever the first guess and the tolerance."""
     i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
-        change = trial[i] - aim[i]
+        change = trial[i] + residual[i] - aim[i]
         drag[i] = change / dt[world]
         if impulse == 0:
             change = change / dt[world]
@@ -180,5 +225,6 @@ def passes(cpu: bool) -> SimpleNamespace:
     """The kernels for one kind of device."""
     image = Pass(Viscous, Applying, DIRECTION, 3, pair, finish, seen=seen).compiled("viscous_image", cpu)
     fullness = Pass(Viscous, Applying, DIRECTION, 1, fullness_pair, fullness_finish).compiled("viscous_fullness", cpu)
-    kernels = {kernel.key: kernel for kernel in (open_solve, *KERNELS, close_solve)}
-    return SimpleNamespace(fullness=fullness, image=image, **kernels)
+    growing = Pass(Viscous, Applying, DIRECTION, 3, growing_pair, growing_finish, seen=seen_growing)
+    kernels = {kernel.key: kernel for kernel in (open_solve, give_growth, *KERNELS, close_solve)}
+    return SimpleNamespace(fullness=fullness, image=image, growing=growing.compiled("viscous_growing", cpu), **kernels)

@@ -204,7 +204,8 @@ class Simulation(Session):
                 self.emission.feed()
             if self.growing is not None:
                 self.growing.grow()
-                self.growing.give_birth(self.now)
+                if self.growing.give_birth(self.now):
+                    self.solver.settle()
             if self.curing is not None:
                 self.curing.ripen()
             if self.contact is not None:

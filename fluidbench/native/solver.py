@@ -51,6 +51,10 @@ class Solver(Method):
         """Enqueue what must follow when particles have appeared, moved in memory or were moved: between substeps, the
         first time outside any graph, later recorded like `substep`."""
 
+    def settle(self) -> None:
+        """Called when parents have had children, which lie over others: between substeps, never recorded. A method
+        whose pressure is finite lets it push them apart."""
+
     def carried(self) -> dict[str, Any]:
         """Arrays beyond the pool's that later substeps depend on, by name: what a checkpoint must hold."""
         return {}

@@ -91,7 +91,6 @@ def strain(
     kept: Floats,
     pulling: Quads,
     pulled: Vectors,
-    drag: Vectors,
 ):
     for i in range(held.shape[0]):
         world = i // capacity
@@ -104,9 +103,6 @@ def strain(
                 correction = symmetric_inverse(symmetric_at(sums, 9))
                 slope = stressed(sums, 0) @ correction
                 slope += dt[world] * slope @ slope
-                spin = 0.5 * dt[world] * (slope - slope.transpose())
-                turned = spin @ drag[i]
-                drag[i] += turned + 0.5 * spin @ turned
                 b, s, share, ratio, push = elastic_normal[i], elastic_shear[i], kept[i], volume_ratio[i], 0.0
                 if held[i] != CARRIED:
                     b, s, share = strained(phase, phase.shear_modulus, slope, b, s, dt[world])
@@ -154,7 +150,6 @@ def pull(
     kept: Floats,
     pulling: Quads,
     pulled: Vectors,
-    drag: Vectors,
 ):
     for i in range(held.shape[0]):
         if i % capacity < count[i // capacity] and held[i] == FREE:

@@ -48,7 +48,6 @@ class Straining:
     kept: wp.array(dtype=float)
     pulling: wp.array(dtype=wp.vec4)
     pulled: wp.array(dtype=wp.vec3)
-    drag: wp.array(dtype=wp.vec3)
 
 
 @wp.kernel
@@ -113,10 +112,6 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
         slope = slope * correction
         # As seen from where the substep began: (1 - h l)^-1 = 1 + h (l + h l^2) + ..., a rotation where v is its chord.
         slope += h * slope * slope
-        # The first guess of the next solve turns with the matter, or it has a torque, which no iteration takes away.
-        spin = 0.5 * h * (slope - wp.transpose(slope))
-        turned = spin * data.drag[i]
-        data.drag[i] = data.drag[i] + turned + 0.5 * (spin * turned)
         b = data.elastic_normal[i]
         s = data.elastic_shear[i]
         ratio = data.volume_ratio[i]

@@ -10,7 +10,7 @@ from fluidbench.native.scene import FRICTION, PERIODIC
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained
 from ..pairs_taichi import over_pairs, reader, vector_at, vector_into
-from ..smoothing import spiky
+from ..smoothing import cusp
 from ..taichi_bridge import (
     Floats,
     Forces,
@@ -28,10 +28,10 @@ from ..taichi_bridge import (
     vec4,
 )
 from .elastic_taichi import KERNELS, NumbersT, sloping
-from .kernels_warp import DRAWN, FARTHEST, HURRIED, SLACK, SLACK_SOLID
+from .kernels_warp import CROWDED, DRAWN, FARTHEST, HURRIED, NEAREST, PARTED, SLACK, SLACK_SOLID
 from .numbers import PLACE, PUSH
 
-summed = taichi_func(spiky)
+summed = taichi_func(cusp)
 place_of, push_of = reader(PLACE), reader(PUSH)
 
 
@@ -79,7 +79,7 @@ def predict(
 
 @ti.func
 def multiplier_pair(num, own, begun, other, r):
-    g = num.weight * sloping(num, other, r)
+    g = num.slope_weight * sloping(num, other, r)
     sums = ti.Vector.zero(ti.f32, 5)
     sums[0], sums[4] = other[3] * summed(r.norm(), num.support), g.norm_sqr()
     return vector_into(sums, 1, g)
@@ -103,6 +103,7 @@ def multipliers(
     phases: Phases,
     phase_of: Ints,
     held: Ints,
+    mass: Floats,
     pushes: Quads,
     fill: Floats,
     correction: Vectors,
@@ -116,8 +117,9 @@ def multipliers(
             fill[i] = dense
             phase = phase_at(phases, world, phase_of[i])
             slope = vector_at(sums, 1).norm() * num.spacing
-            metric = sums[4] * num.spacing * num.spacing + slope * slope + num.relaxation
-            multiplier = -ti.max(dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK), 0.0) / metric
+            metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
+            excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK)
+            multiplier = -ti.math.clamp(excess, 0.0, CROWDED) / metric
             if phase.shear_modulus > 0.0 and not is_solid(phase):
                 even = ti.math.clamp(2.0 - 4.0 * slope / num.face_slope, 0.0, 1.0)
                 within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
@@ -125,12 +127,15 @@ def multipliers(
                 compliance = num.iterations * phase.density / (phase.bulk_modulus * wave * wave)
                 multiplier += DRAWN * even * within * ti.max(1.0 - SLACK - dense, 0.0) / (metric + compliance)
             pushes[2 * i] = places[i]
-            pushes[2 * i + 1] = vec4(multiplier, 0.0, 0.0, 0.0)
+            pushes[2 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), 0.0, 0.0)
 
 
 @ti.func
 def correct_pair(num, own, begun, other, r):
-    return (own[4] + other[4]) * num.weight * sloping(num, other, r)
+    share, mass = 2.0 * other[5] / (own[5] + other[5]), other[3] * other[5]
+    push = share * (own[4] + other[4]) * num.slope_weight * sloping(num, other, r)
+    lap = ti.max(NEAREST * num.spacing / ti.max(r.norm(), 1.0e-9) - 1.0, 0.0)
+    return push + PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing) * r
 
 
 corrected_by = over_pairs(PUSH, 3, correct_pair)
@@ -151,6 +156,7 @@ def correct(
     phases: Phases,
     phase_of: Ints,
     held: Ints,
+    mass: Floats,
     pushed: Quads,
     fill: Floats,
     correction: Vectors,
@@ -179,7 +185,7 @@ def apply(
     for i in range(position.shape[0]):
         if i % capacity < count[i // capacity] and held[i] == FREE:
             shift = correction[i]
-            limit = 0.25 * num.spacing
+            limit = num.spacing
             wanted = shift.norm()
             if shift.norm() > limit:
                 shift *= limit / shift.norm()

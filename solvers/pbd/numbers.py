@@ -1,9 +1,11 @@
 """What the passes of position-based fluids share, in both languages."""
 
+from collections.abc import Callable
+
 import numpy as np
 import warp as wp
 
-from ..smoothing import spiky, spiky_slope
+from ..smoothing import cusp, cusp_slope, spiky, spiky_slope
 
 
 @wp.struct
@@ -13,6 +15,8 @@ class Numbers:
     support: float  # kernel radius H [m]
     spacing: float  # [m]
     weight: float  # makes the density sum exactly 1 on a lattice at rest [-]
+    slope_weight: float  # the same of the kernel whose slope particles are moved along [-]
+    response: float  # of the density to a move along that slope, over that of its own kernel's [-]
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
     face: float  # density at the face of a lattice, over that at rest [-]
@@ -25,20 +29,34 @@ class Numbers:
 PLACE, PUSH, MOVING, PULLING = 4, 8, 8, 16
 
 
-def lattice_sum(support_ratio: float) -> float:
-    """Kernel sum of unit volumes on a cubic lattice of unit spacing."""
+def distances(support_ratio: float) -> np.ndarray:
+    """From a point of a cubic lattice of unit spacing to all that may be within its support, itself included."""
     n = int(support_ratio) + 1
-    axis = np.arange(-n, n + 1)
-    r2 = sum(np.square(g) for g in np.meshgrid(axis, axis, axis))
-    return float(sum(spiky(float(value), support_ratio) for value in np.sqrt(np.ravel(r2))))
+    axis = np.arange(-n, n + 1, dtype=float)
+    return np.sqrt(np.ravel(sum(np.square(g) for g in np.meshgrid(axis, axis, axis))))
+
+
+def lattice_sum(kernel: Callable[[float, float], float], support_ratio: float) -> float:
+    """Kernel sum of unit volumes on a cubic lattice of unit spacing."""
+    return float(sum(kernel(float(r), support_ratio) for r in distances(support_ratio)))
+
+
+def response(support_ratio: float) -> float:
+    """sum w'.s' / sum s'.s' on a lattice, for density by w (`cusp`) and moves along the slope of s (`spiky`), both
+    normalised there: Newton's method divides by the first."""
+    r = [float(r) for r in distances(support_ratio) if 0.0 < r < support_ratio]
+    moved = np.array([spiky_slope(r, support_ratio) for r in r]) / lattice_sum(spiky, support_ratio)
+    felt = np.array([cusp_slope(r, support_ratio) for r in r]) / lattice_sum(cusp, support_ratio)
+    return float(felt @ moved / (moved @ moved))
 
 
 def face_sums(support_ratio: float) -> tuple[float, float]:
-    """(W, |grad W|) summed at the face of a cubic half lattice of unit spacing, over the sum of W within it."""
+    """(w, |grad s|) summed at the face of a cubic half lattice of unit spacing, over the sums of w and s within it: the
+    kernels of `response`."""
     n = int(support_ratio) + 1
     axis = np.arange(-n, n + 1)
     x, y, z = (np.ravel(g).astype(float) for g in np.meshgrid(axis, axis, axis))
     half, r = z <= 0, np.sqrt(x * x + y * y + z * z)
-    whole = lattice_sum(support_ratio)
     slopes = [spiky_slope(float(s), support_ratio) * u / s for s, u in zip(r[z < 0], z[z < 0], strict=True)]
-    return sum(spiky(float(s), support_ratio) for s in r[half]) / whole, abs(sum(slopes)) / whole
+    level = sum(cusp(float(s), support_ratio) for s in r[half]) / lattice_sum(cusp, support_ratio)
+    return level, abs(sum(slopes)) / lattice_sum(spiky, support_ratio)

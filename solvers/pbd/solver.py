@@ -22,10 +22,11 @@ from ..backends import backend_of
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
+from ..smoothing import cusp, spiky
 from ..viscosity import ImplicitViscosity, Tolerance, accuracy, carried_by, footprint_of
 from . import kernels_warp as kernels
 from .elasticity import Elasticity
-from .numbers import MOVING, PLACE, PULLING, PUSH, Numbers, face_sums, lattice_sum
+from .numbers import MOVING, PLACE, PULLING, PUSH, Numbers, face_sums, lattice_sum, response
 
 
 class ConfigPBD(Config):
@@ -38,9 +39,12 @@ class ConfigPBD(Config):
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
 
 
-PRESSED = 100.0  # viscous stress over rho (d / dt)^2: what held at 42 was jammed at 416
-SHAKEN = 0.5  # yield stress over rho (d / dt)^2: what held at 0.1 gained energy at 0.6
+# What constraints push in a substep goes as rho (d / dt)^2, and must match what stress and viscosity pull:
+PRESSED = 100.0  # viscous stress over that: what held at 42 was jammed at 416
+SHAKEN = 0.5  # yield stress over that: what held at 0.1 gained energy at 0.6
 FEATURE = 8.0  # spacings across which matter shears
+INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
+SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
 WAVE = 0.1  # of the time that a wave takes across the narrowest of a solid, that a step may take
 
 
@@ -84,14 +88,8 @@ class SolverPBD(Solver):
         ]
 
     @classmethod
-    def usual_dt(cls, scenario: Scenario, config: Any) -> float:
-        """The time step at the scenario's own speed [s]."""
-        bounds = cls.bounds(scenario, config, scenario.reference_speed)
-        return min(scenario.schedule[0], *(bound.dt for bound in bounds))
-
-    @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
-        m, dt = scenario.material, cls.usual_dt(scenario, config)
+        m = scenario.material
         if m.expansion is not None and (reason := crowded(m.expansion)):
             return reason
         if m.is_solid and scenario.emits:
@@ -99,20 +97,6 @@ class SolverPBD(Solver):
                 f"a solid is fed in (it yields at {m.flow_threshold:.3g} Pa, and its shear modulus is "
                 f"{m.shear_modulus:.3g} Pa): pieces that break off are torn on by gradients of velocity; set a "
                 "material.yield_stress below the shear modulus"
-            )
-        drag = m.viscosity * scenario.reference_speed / (FEATURE * scenario.spacing)
-        if drag > (push := PRESSED * m.density * (scenario.spacing / dt) ** 2):
-            finer = 0.5 * config.advance * math.sqrt(push / drag)
-            return (
-                f"its viscous stress ({drag:.3g} Pa) is too much for what constraints push in a substep (up to "
-                f"{push:.3g} Pa): matter would be pressed together; set numerics.pbd.advance = {finer:.2g} or less"
-            )
-        flows = m.youngs_modulus is not None and not m.is_solid and m.relaxation_time is None
-        if flows and m.flow_threshold > (push := SHAKEN * m.density * (scenario.spacing / dt) ** 2):
-            finer = 0.5 * config.advance * math.sqrt(push / m.flow_threshold)
-            return (
-                f"its yield stress ({m.flow_threshold:.3g} Pa) is too much for what constraints push in a substep (up "
-                f"to {push:.3g} Pa): it would shake itself apart; set numerics.pbd.advance = {finer:.2g} or less"
             )
         return None
 
@@ -134,11 +118,18 @@ class SolverPBD(Solver):
         limits = [Bound("accuracy", a * d / max(speed, 1e-12), f"{a:g} d / v", "references.md, H: no stability bound")]
         if g > 0:
             limits.append(Bound("free fall", (a * d / g) ** 0.5, f"sqrt({a:g} d / |g|)", "same, from rest"))
-        if scenario.material.viscosity > 0:
+        m = scenario.material
+        if m.viscosity > 0:
             limits.append(accuracy(scenario))
-        if scenario.material.is_solid:
+            if (drag := m.viscosity * scenario.reference_speed / (FEATURE * d)) > 0:
+                dt = d * math.sqrt(PRESSED * m.density / drag)
+                limits.append(Bound("viscous push", dt, f"d sqrt({PRESSED:g} rho {FEATURE:g} d / (mu U))", "measured"))
+        if m.is_solid:
             dt = WAVE * scenario.narrowest / scenario.wave_speed
             limits.append(Bound("elastic accuracy", dt, f"{WAVE:g} L / c", "backward Euler damps waves"))
+        elif m.youngs_modulus is not None and m.relaxation_time is None and m.flow_threshold > 0:
+            dt = d * math.sqrt(SHAKEN * m.density / m.flow_threshold)
+            limits.append(Bound("yield push", dt, f"d sqrt({SHAKEN:g} rho / tau_y)", "measured"))
         return limits
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
@@ -148,7 +139,9 @@ class SolverPBD(Solver):
         self.num = Numbers()
         self.num.support = config.support_ratio * scene.spacing
         self.num.spacing = scene.spacing
-        self.num.weight = 1.0 / lattice_sum(config.support_ratio)
+        self.num.weight = 1.0 / lattice_sum(cusp, config.support_ratio)
+        self.num.slope_weight = 1.0 / lattice_sum(spiky, config.support_ratio)
+        self.num.response = response(config.support_ratio)
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
         self.num.face, self.num.face_slope = face_sums(config.support_ratio)
         self.num.iterations = float(config.iterations)
@@ -164,7 +157,8 @@ class SolverPBD(Solver):
         self.constraining = kernels.Constraining()
         self.constraining.dt, self.constraining.phases = scene.dt, scene.phases
         self.constraining.phase_of = pool.phase
-        self.constraining.held, self.constraining.correction = pool.held, self.correction
+        self.constraining.held, self.constraining.mass = pool.held, pool.mass
+        self.constraining.correction = self.correction
         self.constraining.pushes, self.constraining.fill = self.pushes, self.fill
         self.elastic = Elasticity(scene, pool) if scene.elastic else None
         self.order = side_by_side(scene, pool)
@@ -173,8 +167,6 @@ class SolverPBD(Solver):
             support, tolerance = self.num.support, config.viscous_tolerance
             kept = None if self.elastic is None else self.elastic.kept
             self.viscosity = ImplicitViscosity(scene, pool, self.backend, self.neighbours, support, tolerance, kept)
-        if self.elastic is not None:
-            self.elastic.straining.drag = pool.drag
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language."""
@@ -192,10 +184,7 @@ class SolverPBD(Solver):
             self.swell()
         self.predict()
         self.lists()
-        for _ in range(self.config.iterations):
-            self.multipliers()
-            self.correct()
-            self.apply()
+        self.constrain(self.config.iterations)
         self.velocities()
         if self.viscosity is not None:
             self.drag()
@@ -208,6 +197,23 @@ class SolverPBD(Solver):
             self.strain()
             self.pull()
 
+    def constrain(self, iterations: int) -> None:
+        for _ in range(iterations):
+            self.multipliers()
+            self.correct()
+            self.apply()
+
+    def settle(self) -> None:
+        """What was born where others are is moved apart in no time: pushed in a substep it would be flung."""
+        self.refresh()
+        spans = self.scene.dt.numpy().copy()
+        self.scene.dt.fill_(INSTANT * self.scene.spacing)
+        self.predict()
+        self.lists()
+        self.constrain(SETTLING)
+        self.refresh()
+        self.scene.dt.assign(spans)
+
     def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
         self.backend.launch(kernel, self.pool.size, inputs, outputs)
 
@@ -215,12 +221,13 @@ class SolverPBD(Solver):
         return [self.pool.capacity, self.pool.count]
 
     def swell(self) -> None:
-        self.scene.crew.launch(
-            aging.swell,
-            self.pool.size,
-            [*self._active(), self.scene.dt, self.pool.growth],
-            [self.pool.volume],
-        )
+        pool, scene = self.pool, self.scene
+        if self.elastic is None:
+            inputs = [*self._active(), scene.dt, pool.growth]
+            scene.crew.launch(aging.swell, pool.size, inputs, [pool.volume])
+        else:
+            inputs = [*self._active(), scene.dt, scene.phases, pool.phase, pool.growth]
+            scene.crew.launch(aging.swell_by_phase, pool.size, inputs, [pool.volume, pool.volume_ratio])
 
     def harden(self, due: wp.array) -> None:
         pool, crew = self.pool, self.scene.crew

@@ -7,7 +7,7 @@ from fluidbench.method.target import Target
 from fluidbench.native.scene import PERIODIC
 from fluidbench.native.simulation import Simulation
 from solvers.images import INDEX_BITS
-from solvers.smoothing import spiky
+from solvers.smoothing import cusp
 
 from ..conftest import scenario
 
@@ -114,7 +114,7 @@ def test_lists_hold_all_that_is_in_reach_and_sums_are_theirs(walls, number, worl
     solver.backend.wait()
     fill = solver.fill.numpy()
     for i, partners in expected.items():
-        total = volume * (spiky(0.0, support) + sum(spiky(r, support) for r in partners.values()))
+        total = volume * (cusp(0.0, support) + sum(cusp(r, support) for r in partners.values()))
         assert fill[i] == pytest.approx(solver.num.weight * total, rel=1e-5)
 
 

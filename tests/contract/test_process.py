@@ -72,6 +72,16 @@ def test_spawning_splits_mass_exactly(method, ratio, jitter):
     assert abs(len(after["mass"]) / len(before["mass"]) / ratio - 1) < 0.25
 
 
+def test_spawned_foam_keeps_its_momentum_and_is_not_flung():
+    """In free flight, children of several rest densities and volumes: what PBD pushes apart it does not throw."""
+    model = {"kind": "spawn", "ratio": 5.0, "passes": 5, "interval": 0.03, "delay": 0.02}
+    before, after, _ = ran(foam({"expansion": model}, duration=0.2), "pbd")
+    sums = [(f["mass"].astype(float)[:, None] * f["velocity"]).sum(axis=0) for f in (before, after)]
+    assert len(after["mass"]) > 3 * len(before["mass"])
+    assert sums[1] == pytest.approx(sums[0], rel=1e-5, abs=1e-9)
+    assert np.linalg.norm(after["velocity"], axis=1).max() < 0.2
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_growth_without_splitting_keeps_its_particles(method):
     before, after, _ = ran(foam({"expansion": {"ratio": 1.4, "time": 0.05, "split": False}}), method)

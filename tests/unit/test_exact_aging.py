@@ -98,3 +98,12 @@ def test_rest_volumes_grow_by_their_rate():
     launch(aging.swell_at_volume, 3, [3, count, dt, growth], [volume, ratio])
     assert volume.numpy() == pytest.approx([3.0 * math.exp(0.5), 3.0, 3.0])
     assert ratio.numpy() == pytest.approx([0.9 * math.exp(-0.5), 0.9, 0.9])
+
+
+def test_where_solids_alone_integrate_j_only_theirs_answers_growth():
+    count, dt, growth = wp.array([2], dtype=int), numbers(0.25), numbers(2.0, 2.0, 2.0)
+    phases = Scene(scenario(material=FRESH | {"cure": HARD | {"yield_stress": 1e6}})).phases
+    volume, ratio, phase = numbers(3.0, 3.0, 3.0), numbers(0.9, 0.9, 0.9), wp.array([0, 1, 1], dtype=int)
+    launch(aging.swell_by_phase, 3, [3, count, dt, phases, phase, growth], [volume, ratio])
+    assert volume.numpy() == pytest.approx([3.0 * math.exp(0.5)] * 2 + [3.0])
+    assert ratio.numpy() == pytest.approx([0.9, 0.9 * math.exp(-0.5), 0.9])

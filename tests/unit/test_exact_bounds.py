@@ -100,6 +100,18 @@ def test_pbd_by_hand():
     assert list(still) == ["accuracy"] and still["accuracy"] > 1e6
 
 
+def test_pbd_pushes_as_hard_as_stress_pulls():
+    """0.5 rho (d / dt)^2 is a yield stress, 100 rho (d / dt)^2 the viscous stress mu U / 8 d; foam that has grown is
+    lighter."""
+    paste = {"youngs_modulus": 1e6, "yield_stress": 500.0}
+    assert bounds("pbd", material=paste)["yield push"] == pytest.approx(D * math.sqrt(0.5 * 1000.0 / 500.0))
+    for other in ({}, {"yield_stress": 1e9}, {"yield_stress": 0.0}, {"yield_stress": None, "relaxation_time": 0.1}):
+        assert "yield push" not in bounds("pbd", material={"youngs_modulus": 1e6, **other})
+    u = scenario(material={"density": 1000.0}, spacing=D).reference_speed
+    got = bounds("pbd", material={"viscosity": 50.0})
+    assert got["viscous push"] == pytest.approx(D * math.sqrt(100.0 * 1000.0 / (50.0 * u / (8.0 * D))))
+
+
 def test_formulas_name_the_numbers_that_were_used():
     made = {}
     for method in ("mpm", "sph", "pbd"):

@@ -143,6 +143,14 @@ def test_spiky_by_hand(support):
         assert smoothing.spiky_slope(r, support) == exact(-45.0 / (math.pi * support**4) * left**2)
 
 
+@pytest.mark.parametrize("support", [0.5, 2.0])
+def test_the_cusp_by_hand(support):
+    for share in (0.0, 0.5, 1.0, 1.1):
+        r, left = share * support, max(1.0 - share, 0.0)
+        assert smoothing.cusp(r, support) == exact(7.5 / (math.pi * support**3) * left**2)
+        assert smoothing.cusp_slope(r, support) == exact(-15.0 / (math.pi * support**4) * left)
+
+
 def test_the_spline_by_hand():
     assert smoothing.quadratic_spline(0.5) == exact((0.5, 0.5, 0.0))
     assert smoothing.quadratic_spline(1.0) == exact((0.125, 0.75, 0.125))

@@ -33,6 +33,12 @@ def test_spiky_gradient_integrates_to_minus_three():
     assert volume_integral(lambda r: smoothing.spiky_slope(r, H) * r, H) == pytest.approx(-3.0, rel=1e-6)
 
 
+def test_the_cusp_is_normalised_and_its_slope_is_its_derivative():
+    H = 0.9
+    assert volume_integral(lambda r: smoothing.cusp(r, H), H) == pytest.approx(1.0, rel=1e-6)
+    assert volume_integral(lambda r: smoothing.cusp_slope(r, H) * r, H) == pytest.approx(-3.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("x", np.linspace(0.5, 1.5, 7))
 def test_spline_moments(x):
     """Weights are positive, sum to 1, reproduce x, and have second moment x^2 + 1/4."""

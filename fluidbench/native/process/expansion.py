@@ -125,10 +125,11 @@ class Growing:
         self.grow()
         self.give_birth(now)
 
-    def give_birth(self, now: float) -> None:
-        """The children that are due at `now` [s]: how many decides the device, so that the host must wait for it."""
+    def give_birth(self, now: float) -> bool:
+        """The children that are due at `now` [s], and whether there are any: how many decides the device, so that the
+        host must wait for it."""
         if not self.births:
-            return
+            return False
         pool, device = self.pool, self.scene.device
         self.born.zero_()
         wp.launch(
@@ -151,7 +152,7 @@ class Growing:
         )
         *each, parents = self.born.numpy().tolist()
         if not parents:
-            return
+            return False
         pool.stale = True  # a parent moves even with a single child
         born = np.array(each)
         for world in range(pool.worlds):
@@ -183,6 +184,7 @@ class Growing:
             [pool.position, pool.velocity, pool.mass, pool.volume, pool.origin, pool.generation],
             device=device,
         )
+        return True
 
     def footprint(self) -> dict[str, int]:
         names = ("offspring_count", "parent", "number", "born", "old") if self.births else ()
