@@ -65,5 +65,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=RADIUS / 10,
-    exempt={"pbd": "only density resists, as a bound: the thin axis stays too thick by the packing of the surface"},
 )
