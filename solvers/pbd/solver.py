@@ -41,7 +41,7 @@ class ConfigPBD(Config):
 
 # What constraints push in a substep goes as rho (d / dt)^2, and must match what stress and viscosity pull:
 PRESSED = 100.0  # viscous stress over that: what held at 42 was jammed at 416
-SHAKEN = 0.5  # yield stress over that: what held at 0.1 gained energy at 0.6
+SHAKEN = 0.1  # yield stress over that: what held there gained energy at 0.6
 FEATURE = 8.0  # spacings across which matter shears
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
@@ -209,8 +209,9 @@ class SolverPBD(Solver):
         spans = self.scene.dt.numpy().copy()
         self.scene.dt.fill_(INSTANT * self.scene.spacing)
         self.predict()
-        self.lists()
-        self.constrain(SETTLING)
+        for _ in range(SETTLING):
+            self.lists()  # what moves far in one iteration has other neighbours in the next
+            self.constrain(1)
         self.refresh()
         self.scene.dt.assign(spans)
 
