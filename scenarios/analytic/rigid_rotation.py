@@ -53,7 +53,6 @@ CASE = Case(
     "|L / L0 - 1| per turn",
     spacing=0.01,
     tolerance=1e-3,
-    tolerances={"pbd": 5e-3},  # what the residual of an implicit solve leaves, see docs/physics.md
     scenarios=scenarios,
     evaluate=evaluate,
 )

@@ -25,7 +25,7 @@ class Numbers:
 
 
 # Floats in the rows that neighbours are asked for. Of density: position, volume. Of its constraints: the same |
-# multiplier. Of velocities: the same | velocity. Of stress: the same | stress (9).
+# multiplier, heft. Of velocities: the same | velocity. Of stress: the same | stress (9).
 PLACE, PUSH, MOVING, PULLING = 4, 8, 8, 16
 
 

@@ -204,7 +204,8 @@ class SolverPBD(Solver):
             self.apply()
 
     def settle(self) -> None:
-        """What was born where others are is moved apart in no time: pushed in a substep it would be flung."""
+        """What was born where others are is moved apart in no time: pushed in a substep it would be flung. All worlds
+        of a batch are pressed, those without offspring by what little their density is off."""
         self.refresh()
         spans = self.scene.dt.numpy().copy()
         self.scene.dt.fill_(INSTANT * self.scene.spacing)
@@ -332,7 +333,7 @@ class SolverPBD(Solver):
         return self.order.keys()
 
     def solves(self) -> dict[str, float]:
-        return {} if self.viscosity is None else self.viscosity.effort()
+        return {} if self.viscosity is None else self.viscosity.iterations.effort()
 
     def densities(self) -> np.ndarray:
         return present_density(self.pool, 1.0 / np.maximum(self.fill.numpy(), 1.0))
