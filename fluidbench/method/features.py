@@ -5,8 +5,6 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from ..scenario.domain import Friction
-
 if TYPE_CHECKING:
     from ..scenario import Scenario
 
@@ -37,7 +35,7 @@ def needed(scenario: Scenario) -> frozenset[Feature]:
         Feature.ELASTICITY: any(level.youngs_modulus is not None for level in levels),
         Feature.YIELD: any(bool(level.yield_stress) for level in levels),
         Feature.RELAXATION: m.relaxation_time is not None,
-        Feature.FRICTION: any(isinstance(wall, Friction) for wall in walls.faces()),
+        Feature.FRICTION: scenario.domain.rubs,
         Feature.PERIODIC: any(walls.periodic()),
         Feature.CURE: m.cure is not None,
         Feature.EXPANSION: m.expansion is not None,

@@ -122,10 +122,10 @@ class Scene:
         with wp.ScopedDevice(self.device):
             self.dt = wp.zeros(self.worlds, dtype=float)
             self.force = wp.array([_force(s) for s in self.scenarios], dtype=Force)
-            rows = [s.material.levels() for s in self.scenarios]
-            self.materials = [m for row in rows for m in row]
-            self.levels = len(rows[0])  # rows of the phase table: levels of cure, the fresh material first
-            table = [self._phase(m) for row in rows for m in row]
+            rows = [(s, m) for s in self.scenarios for m in s.material.levels()]
+            self.materials = [m for _, m in rows]
+            self.levels = len(rows) // self.worlds  # rows of the phase table: levels of cure, the fresh material first
+            table = [self._phase(*row) for row in rows]
             self.phases = wp.array(table, dtype=Phase).reshape((self.worlds, self.levels))
 
     def _check_worlds(self) -> None:
@@ -142,7 +142,7 @@ class Scene:
                 if getattr(other.material, section) != getattr(self.scenario.material, section):
                     raise UserError(f"worlds must share material.{section}; world {i} differs")
 
-    def _phase(self, material: Material) -> Phase:
+    def _phase(self, scenario: Scenario, material: Material) -> Phase:
         phase = Phase()
         phase.wave_speed = material.wave_speed(self.sound_speed)
         phase.density = material.density
@@ -154,8 +154,9 @@ class Scene:
         phase.relaxation_rate = 0.0 if material.relaxation_time is None else 1.0 / material.relaxation_time
         phase.flow_index = material.flow_index
         phase.tait = 1.0 if material.equation_of_state == "tait" else 0.0
-        # Unless told, a liquid cavitates rather than carry tension; what has shear stiffness holds together.
-        limit = 0.0 if material.youngs_modulus is None else NEVER_YIELDS
+        # Unless told, a liquid cavitates rather than carry tension, but for that of its own viscosity where it is fed;
+        # what has shear stiffness holds together.
+        limit = scenario.feeding_pressure if material.youngs_modulus is None else NEVER_YIELDS
         phase.tension_limit = limit if material.tension_limit is None else min(material.tension_limit, NEVER_YIELDS)
         return phase
 

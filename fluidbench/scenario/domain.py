@@ -57,6 +57,11 @@ class Domain(Model):
                 raise ValueError(f"upper must exceed lower on the {axis} axis, got {low} and {high}")
         return self
 
+    @property
+    def rubs(self) -> bool:
+        """Whether a wall has friction."""
+        return any(isinstance(wall, Friction) for wall in self.walls.faces())
+
     def contains(self, points, margin: float = 1e-9) -> np.ndarray:
         points = np.asarray(points, dtype=float)
         inside = (points >= np.array(self.lower) - margin) & (points <= np.array(self.upper) + margin)

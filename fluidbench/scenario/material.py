@@ -29,7 +29,9 @@ class Material(Model):
     sound_speed: Positive | None = Field(None, description="sqrt(K/rho) [m/s]; overrides K from E and nu")
     bulk_modulus: Positive | None = Field(None, description="bulk modulus K [Pa]; overrides K from E and nu")
     tension_limit: NonNegative | None = Field(
-        None, description="tension at which it cavitates [Pa]; else a liquid does at 0, what has strength never"
+        None,
+        description="tension at which it cavitates [Pa]; else a liquid does at 0, or at viscosity times speed over "
+        "diameter of what a nozzle feeds, and what has strength never",
     )
     equation_of_state: Literal["linear", "tait"] = Field("linear", description="pressure law; Tait has gamma = 7")
     cure: Cure | None = Field(None, description="how it cures after it left the nozzle")

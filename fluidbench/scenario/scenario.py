@@ -267,8 +267,21 @@ class Scenario(Model):
 
     @property
     def liquid_sound_speed(self) -> float:
-        """Artificial sound speed of a liquid [m/s]: `sound_speed_ratio` times the reference speed (Monaghan 1994)."""
-        return self.sound_speed_ratio * self.reference_speed
+        """Artificial sound speed of a liquid [m/s]: `sound_speed_ratio` times the reference speed (Monaghan 1994), or
+        times sqrt(feeding pressure / density) where that is more: the larger of the scales of Morris et al. 1997, eq.
+        for c in section 2.3."""
+        fed = math.sqrt(self.feeding_pressure / self.material.density)
+        return self.sound_speed_ratio * max(self.reference_speed, fed)
+
+    @cached_property
+    def feeding_pressure(self) -> float:
+        """eta U / D [Pa], of matter that a nozzle of diameter D feeds at U: the scale of the viscous stress that pushes
+        and pulls it. A liquid that resists compression with less changes its density by as much, one that carries
+        less tension is torn apart by its own viscosity. (Motion that nobody feeds runs out of energy before.)"""
+        if self.nozzle is None:
+            return 0.0
+        speed = math.hypot(self.nozzle.speed, 0.0 if self.toolpath is None else self.toolpath.speed)
+        return self.material.viscosity * speed / self.nozzle.diameter
 
     @property
     def wave_speed(self) -> float:
@@ -289,8 +302,9 @@ class Scenario(Model):
         return max(m.wave_speed(self.liquid_sound_speed) for m in self.aged[1])
 
     def made_of(self, material: Material) -> "Scenario":
-        """The same scenario as if all its material were this."""
+        """The same scenario as if all its material were this; what is fed in is as viscous as before."""
         made = self.model_copy(update={"material": material})
+        vars(made)["feeding_pressure"] = self.feeding_pressure
         if self.track is not None:
             vars(made)["track"] = self.track  # no matter of the material, and dear to lay out
         return made
@@ -329,5 +343,10 @@ class Scenario(Model):
             out.append(
                 f"the material's wave speed ({self.wave_speed:.3g} m/s) is below 3 times the scenario's speed "
                 f"({self.reference_speed:.3g} m/s): expect visible compression"
+            )
+        if m.bulk(self.liquid_sound_speed) < 10 * self.feeding_pressure:
+            out.append(
+                f"viscosity times speed over the nozzle's diameter ({self.feeding_pressure:.3g} Pa) is over a tenth of "
+                f"the material's bulk modulus ({m.bulk(self.liquid_sound_speed):.3g} Pa): expect visible compression"
             )
         return out

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from fluidbench.native.scene import Scene
 from fluidbench.scenario import Domain, Nozzle, Walls
 
 from ..conftest import G, bead, scenario
@@ -163,3 +164,21 @@ def test_a_nozzle_has_a_speed_or_a_rate():
     for more in ({}, {"exit_speed": 1.0, "flow_rate": 1.0}):
         with pytest.raises(ValueError, match="exactly one of exit_speed and flow_rate"):
             Nozzle(diameter=0.01, standoff=1.0, **more)
+
+
+def test_a_liquid_is_as_stiff_as_what_pushes_it():
+    """12 mm at 0.1 m/s down and 0.1 along, 300 Pa s: 300 sqrt(0.02) / 0.012 = 3536 Pa, c = 10 sqrt(3536 / 1400) m/s;
+    it carries that much tension. Thin ones are as stiff as gravity asks, and cavitate at as little as they are thin."""
+    thick, thin = (bead(material={"density": 1400.0, "viscosity": eta}) for eta in (300.0, 1.0))
+    pressure = 300.0 * math.sqrt(0.02) / 0.012
+    assert thick.feeding_pressure == pytest.approx(pressure)
+    assert thick.liquid_sound_speed == pytest.approx(10.0 * math.sqrt(pressure / 1400.0)) == thick.wave_speed
+    assert thin.liquid_sound_speed == pytest.approx(10.0 * thin.reference_speed)
+    assert Scene(thick).phases.numpy()["tension_limit"] == pytest.approx(pressure)
+    told = bead(material={"density": 1400.0, "viscosity": 300.0, "tension_limit": 7.0})
+    assert Scene(told).phases.numpy()["tension_limit"] == 7.0
+    hardened = thick.made_of(thick.material.model_copy(update={"viscosity": 1e6}))
+    assert hardened.feeding_pressure == thick.feeding_pressure and hardened.wave_speed == thick.wave_speed
+    assert scenario(material={"density": 1000.0, "viscosity": 1e6}).feeding_pressure == 0.0
+    soft = bead(material={"density": 1400.0, "viscosity": 300.0, "bulk_modulus": 3e4})
+    assert any("expect visible compression" in w for w in soft.warnings()) and not thick.warnings()

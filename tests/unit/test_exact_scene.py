@@ -140,7 +140,7 @@ def test_solid_is_what_never_flows():
     scene = Scene(scenario(material=PASTE))
 
     def solid(shear, stress, rate):
-        made = type(scene._phase(scene.scenario.material))()
+        made = type(scene._phase(scene.scenario, scene.scenario.material))()
         made.shear_modulus, made.yield_stress, made.relaxation_rate = shear, stress, rate
         return bool(is_solid(made))
 
