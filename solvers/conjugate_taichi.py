@@ -82,11 +82,11 @@ def turn(capacity: int, count: Ints, totals: Table, residual: Vectors, rows: Qua
 
 
 @ti.func
-def summed(partial: ti.template(), world, chunks):
+def summed(partial: ti.template(), first, end):
     """The sum over a world's chunks, in double precision."""
     left, right = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
     ti.loop_config(serialize=True)
-    for k in range(world * chunks, (world + 1) * chunks):
+    for k in range(first, end):
         left += partial[k][0]
         right += partial[k][1]
     return vec2(left, right)
@@ -105,9 +105,9 @@ def unsolved(end: ti.template(), left, right):
 
 
 @ti.kernel
-def weigh_start(end: EndingT, chunks: int, team: int, partial: Twos, totals: Table, going: Ints):
+def weigh_start(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Table, going: Ints):
     for world in range(totals.shape[0]):
-        sums = summed(partial, world, chunks)
+        sums = summed(partial, begin[world], begin[world + 1])
         for k in ti.static(range(5)):
             totals[world, k] = 0.0
         totals[world, LEFT], totals[world, RIGHT] = sums[0], sums[1]
@@ -116,9 +116,9 @@ def weigh_start(end: EndingT, chunks: int, team: int, partial: Twos, totals: Tab
 
 
 @ti.kernel
-def weigh_step(end: EndingT, chunks: int, team: int, partial: Twos, totals: Table, going: Ints):
+def weigh_step(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Table, going: Ints):
     for world in range(totals.shape[0]):
-        sums = summed(partial, world, chunks)
+        sums = summed(partial, begin[world], begin[world + 1])
         totals[world, STEP] = 0.0
         if unsolved(end, totals[world, LEFT], totals[world, RIGHT]):
             totals[world, ITERATIONS] += 1.0
@@ -128,9 +128,9 @@ def weigh_step(end: EndingT, chunks: int, team: int, partial: Twos, totals: Tabl
 
 
 @ti.kernel
-def weigh_turn(end: EndingT, chunks: int, team: int, partial: Twos, totals: Table, going: Ints):
+def weigh_turn(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Table, going: Ints):
     for world in range(totals.shape[0]):
-        sums = summed(partial, world, chunks)
+        sums = summed(partial, begin[world], begin[world + 1])
         totals[world, TURN] = 0.0
         if totals[world, STEP] != 0.0 or no_number(totals[world, STEP]):
             totals[world, TURN] = sums[0] / totals[world, LEFT]

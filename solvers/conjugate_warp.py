@@ -144,11 +144,11 @@ def turn(
 
 
 @wp.func
-def summed(partial: wp.array(dtype=wp.vec2), first: int, chunks: int, member: int, team: int):
+def summed(partial: wp.array(dtype=wp.vec2), first: int, end: int, member: int, team: int):
     """The sum over a world's chunks, in double precision until threads join theirs."""
     left, right = wp.float64(0.0), wp.float64(0.0)
-    for k in range(member, chunks, team):
-        value = partial[first + k]
+    for k in range(first + member, end, team):
+        value = partial[k]
         left += wp.float64(value[0])
         right += wp.float64(value[1])
     return wp.vec2(joined(float(left), team), joined(float(right), team))
@@ -163,7 +163,7 @@ def unsolved(end: Ending, left: float, right: float):
 @wp.kernel
 def weigh_start(
     end: Ending,
-    chunks: int,
+    begin: wp.array(dtype=int),
     team: int,
     partial: wp.array(dtype=wp.vec2),
     # outputs
@@ -173,7 +173,7 @@ def weigh_start(
     """m r.r and m v*.v*, and whether there is anything to solve. `going` was 0."""
     thread = wp.tid()
     world = thread / team
-    found = summed(partial, world * chunks, chunks, thread - world * team, team)
+    found = summed(partial, begin[world], begin[world + 1], thread - world * team, team)
     if thread == world * team:
         total = Totals()
         total.left = found[0]
@@ -186,7 +186,7 @@ def weigh_start(
 @wp.kernel
 def weigh_step(
     end: Ending,
-    chunks: int,
+    begin: wp.array(dtype=int),
     team: int,
     partial: wp.array(dtype=wp.vec2),
     # outputs
@@ -196,7 +196,7 @@ def weigh_step(
     """alpha = m r.r / m p.Kp; none where a world is done."""
     thread = wp.tid()
     world = thread / team
-    found = summed(partial, world * chunks, chunks, thread - world * team, team)
+    found = summed(partial, begin[world], begin[world + 1], thread - world * team, team)
     if thread == world * team:
         total = totals[world]
         total.step = 0.0
@@ -211,7 +211,7 @@ def weigh_step(
 @wp.kernel
 def weigh_turn(
     end: Ending,
-    chunks: int,
+    begin: wp.array(dtype=int),
     team: int,
     partial: wp.array(dtype=wp.vec2),
     # outputs
@@ -221,7 +221,7 @@ def weigh_turn(
     """beta, and whether to go on."""
     thread = wp.tid()
     world = thread / team
-    found = summed(partial, world * chunks, chunks, thread - world * team, team)
+    found = summed(partial, begin[world], begin[world + 1], thread - world * team, team)
     if thread == world * team:
         total = totals[world]
         total.turn = 0.0

@@ -36,19 +36,20 @@ from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 from fluidbench.scenario import Scenario
 
-from . import conjugate_warp as conjugate
 from . import viscosity_warp as kernels
 from .backends import Backend
+from .conjugate import Iterations
+from .conjugate_warp import CHUNK
 
 Scheme = Literal["auto", "explicit", "implicit"]
 Tolerance = Annotated[float, Field(gt=0, le=1e-2, description="residual of implicit viscosity, over the velocity")]
-WORTH = 6.0  # times the substeps that explicit viscosity may take before implicit is cheaper
+WORTH = 6.0  # times the substeps that explicit viscosity on pairs may take before implicit is cheaper
 RESOLVED, OVER = 0.1, 5e-3  # of the slowest viscous decay, and of the time across matter, that a step may take
-MOST = 400  # iterations of one solve: a thousandfold of the explicit step takes some hundred
 
 
-def implicit_is_cheaper(method: Any, scenario: Scenario, config: Any) -> bool:
-    """Whether the bounds of the most viscous matter of a run say that implicit viscosity is cheaper."""
+def implicit_is_cheaper(method: Any, scenario: Scenario, config: Any, worth: float = WORTH) -> bool:
+    """Whether the bounds of the most viscous matter of a run say that implicit viscosity is cheaper: that explicit
+    takes more than `worth` times as many substeps."""
     thickest = max(scenario.aged[1], key=lambda m: m.viscosity)
     if thickest.viscosity == 0.0:
         return False
@@ -57,7 +58,7 @@ def implicit_is_cheaper(method: Any, scenario: Scenario, config: Any) -> bool:
     for scheme in ("explicit", "implicit"):
         bounds = method.bounds(made, config.model_copy(update={"viscosity": scheme}), made.reference_speed)
         steps.append(min(made.schedule[0], *(b.dt for b in bounds)))
-    return bool(steps[0] * WORTH < steps[1])
+    return bool(steps[0] * worth < steps[1])
 
 
 def accuracy(scenario: Scenario) -> Bound:
@@ -74,12 +75,12 @@ def accuracy(scenario: Scenario) -> Bound:
     )
 
 
-def carried_by(viscosity: ImplicitViscosity | None) -> dict[str, wp.array]:
+def carried_by(viscosity: Any) -> dict[str, wp.array]:
     """What a checkpoint must hold of it."""
-    return {} if viscosity is None else {"counted": viscosity.counted, "worst": viscosity.worst}
+    return {} if viscosity is None else viscosity.iterations.carried()
 
 
-def footprint_of(viscosity: ImplicitViscosity | None) -> dict[str, int]:
+def footprint_of(viscosity: Any) -> dict[str, int]:
     """Bytes that it takes beside the pool."""
     return {} if viscosity is None else {f"viscous_{name}": getattr(viscosity, name).capacity for name in viscosity.OWN}
 
@@ -103,20 +104,18 @@ class ImplicitViscosity:
         stress is implicit, too, `kept` is the share of each particle's that flow leaves of it."""
         self.scene, self.pool, self.backend, self.neighbours = scene, pool, backend, neighbours
         self.kernels = self.kernels_of(backend.name)
-        self.num, self.ending = kernels.Viscous(), conjugate.Ending()
-        self.num.support, self.ending.tolerance, self.ending.most = support, tolerance, MOST
+        self.num = kernels.Viscous()
+        self.num.support = support
         self.drag = pool.add_field("drag", wp.vec3)
         self.elastic = [int(kept is not None), pool.volume if kept is None else kept]
         worlds = len(scene.scenarios)
-        self.chunks = pool.capacity // conjugate.CHUNK
-        self.team = 1 if scene.device.is_cpu else conjugate.TEAM
+        self.chunks = pool.capacity // CHUNK
         with wp.ScopedDevice(scene.device):
             self.rows = wp.zeros(pool.size * kernels.DIRECTION // 4, dtype=wp.vec4)
             self.aim, self.trial, self.image, self.residual = (wp.zeros(pool.size, dtype=wp.vec3) for _ in range(4))
             self.partial = wp.zeros(worlds * self.chunks, dtype=wp.vec2)
-            self.totals = wp.zeros(worlds, dtype=conjugate.Totals)
-            self.going = wp.zeros(1, dtype=int)
-            self.counted, self.worst = wp.zeros((worlds, 3), dtype=int), wp.zeros(worlds, dtype=float)
+            begin = wp.array([world * self.chunks for world in range(worlds + 1)], dtype=int)
+        self.iterations = Iterations(backend, self.kernels, tolerance, begin, self.partial)
         self.applying = kernels.Applying()
         self.applying.dt, self.applying.held, self.applying.image = scene.dt, pool.held, self.image
         self.applying.mass, self.applying.volume, self.applying.rows = pool.mass, pool.volume, self.rows
@@ -142,9 +141,8 @@ class ImplicitViscosity:
             self._over_pairs("growing")
         inputs = [pool.held, pool.mass, self.aim, self.image]
         self._particles("residual_of", inputs, [self.residual, self.rows, self.partial], self.chunks)
-        self._weigh("weigh_start")
-        self.backend.repeat(self.going, self._iterate)
-        self._launch("note", len(scene.scenarios), [self.ending, self.totals], [self.going, self.counted, self.worst])
+        self.iterations.begin_with()
+        self.iterations.repeat(self._iterate)
         ends = [scene.dt, pool.held, self.aim, self.trial, self.residual, int(impulse)]
         self._particles("close_solve", ends, [self.drag, target])
 
@@ -153,11 +151,11 @@ class ImplicitViscosity:
         mass, search = self.pool.mass, [self.rows, self.image]
         self._over_pairs("image")
         self._particles("along", [mass, *search], [self.partial], self.chunks)
-        self._weigh("weigh_step")
+        self.iterations.step()
         moved = [self.trial, self.residual, self.partial]
-        self._particles("descend", [mass, *search, self.totals], moved, self.chunks)
-        self._weigh("weigh_turn")
-        self._particles("turn", [self.totals, self.residual], [self.rows])
+        self._particles("descend", [mass, *search, self.iterations.totals], moved, self.chunks)
+        self.iterations.turn()
+        self._particles("turn", [self.iterations.totals, self.residual], [self.rows])
 
     def _over_pairs(self, name: str) -> None:
         lists, pool = self.neighbours, self.pool
@@ -170,21 +168,5 @@ class ImplicitViscosity:
         size = len(self.scene.scenarios) * chunks or pool.size
         self._launch(name, size, [pool.capacity, pool.count, *inputs], outputs)
 
-    def _weigh(self, name: str) -> None:
-        size = len(self.scene.scenarios) * self.team
-        self._launch(name, size, [self.ending, self.chunks, self.team, self.partial], [self.totals, self.going])
-
     def _launch(self, name: str, size: int, inputs: list[Any], outputs: list[Any]) -> None:
         self.backend.launch(getattr(self.kernels, name), size, inputs, outputs)
-
-    def effort(self, world: int = 0) -> dict[str, float]:
-        """Iterations a solve, largest residual over v*, share of solves that did not converge; nothing before the
-        first."""
-        solves, iterations, unconverged = (int(n) for n in self.counted.numpy()[world])
-        if not solves:
-            return {}
-        return {
-            "iterations": iterations / solves,
-            "residual": float(self.worst.numpy()[world]),
-            "unconverged": unconverged / solves,
-        }

@@ -8,13 +8,14 @@ from fluidbench.native.scene import Scene
 
 from .grid import Grid
 from .homes import PATCH, Homes, enrol, find_homes
-from .patches import add_up, gather, scatter
+from .patches import add_up, gather, resist, scatter
 
 
 class ByBlock:
     """What the block-wise transfers allocate, and their launches; for one thread of the CPU or several."""
 
-    def __init__(self, scene: Scene, pool: Pool, slots: int) -> None:
+    def __init__(self, scene: Scene, pool: Pool, slots: int, resists: bool) -> None:
+        """`resists` is whether viscosity is implicit."""
         self.scene, self.pool, self.launch, self.lanes = scene, pool, scene.crew.launch, scene.crew.threads
         homes = self.homes = Homes()
         with wp.ScopedDevice(scene.device):
@@ -23,6 +24,7 @@ class ByBlock:
             homes.members, homes.of_particle = (wp.zeros(pool.size, dtype=int) for _ in range(2))
             homes.of_slot = wp.zeros(slots, dtype=int)
             homes.patch = wp.empty(slots * PATCH, dtype=wp.vec4)
+            self.given = wp.empty(pool.size if resists else 0, dtype=wp.mat33)
 
     def prepare(self) -> None:
         for kernel in (find_homes, scatter):
@@ -31,9 +33,18 @@ class ByBlock:
     def refresh(self) -> None:
         self.launch(put, 1, [1, self.homes.outdated])
 
-    def p2g(self, grid: Grid, table: wp.array, block_of: wp.array, active: wp.array, raw: wp.array) -> None:
+    def p2g(
+        self,
+        grid: Grid,
+        table: wp.array,
+        block_of: wp.array,
+        active: wp.array,
+        dt: wp.array,
+        drags: int,
+        raw: wp.array,
+    ) -> None:
         """Find homes anew where particles have moved to others; then scatter, and add up."""
-        pool, scene = self.pool, self.scene
+        pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
         wp.capture_if(self.homes.outdated, on_true=lambda: self._enrol(grid, table))
         self.launch(
             scatter,
@@ -43,7 +54,8 @@ class ByBlock:
                 grid,
                 pool.capacity,
                 self.homes,
-                scene.dt,
+                dt,
+                drags,
                 scene.phases,
                 pool.position,
                 pool.velocity,
@@ -52,10 +64,26 @@ class ByBlock:
                 pool.volume,
                 pool.phase,
                 pool.held,
+                hours.row,
+                hours.exit,
             ],
             [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear],
         )
         self.launch(add_up, self.lanes, [self.lanes, grid, active, block_of, table, self.homes], [raw])
+
+    def resist(
+        self, grid: Grid, table: wp.array, block_of: wp.array, active: wp.array, nodes: wp.array, image: wp.array
+    ) -> None:
+        """image += dt A v (implicit.py), with v the velocities of the nodes."""
+        pool, scene = self.pool, self.scene
+        matter = [pool.phase, pool.position, pool.volume, pool.volume_ratio]
+        self.launch(
+            resist,
+            self.lanes,
+            [self.lanes, grid, pool.capacity, self.homes, scene.dt, scene.phases, *matter, nodes, table, block_of],
+            [self.given],
+        )
+        self.launch(add_up, self.lanes, [self.lanes, grid, active, block_of, table, self.homes], [image])
 
     def _enrol(self, grid: Grid, table: wp.array) -> None:
         pool = self.pool
@@ -108,4 +136,5 @@ class ByBlock:
         )
 
     def footprint(self) -> dict[str, int]:
-        return {f"homes.{name}": getattr(self.homes, name).capacity for name in Homes.vars}
+        given = {"given": self.given.capacity} if self.given.size else {}
+        return {f"homes.{name}": getattr(self.homes, name).capacity for name in Homes.vars} | given

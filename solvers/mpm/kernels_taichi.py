@@ -72,15 +72,48 @@ def weights(f):
 
 
 @ti.func
-def kirchhoff(phase, j, b, s, rate):
-    """tau = -J p 1 + G dev(b) + 2 min(J, 1) eta dev(D) [Pa]."""
+def kirchhoff(phase, j, b, s):
+    """tau = -J p 1 + G dev(b) [Pa]."""
     unit = ti.Matrix.identity(ti.f32, 3)
     p = pressure(1.0 / j - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-    tau = phase.shear_modulus * (symmetric(b, s) - (b.sum() / 3.0) * unit) - (j * p) * unit
-    if phase.viscosity > 0.0:
-        symmetrical = 0.5 * (rate + rate.transpose())
-        tau += (2.0 * ti.min(j, 1.0) * phase.viscosity) * (symmetrical - (rate.trace() / 3.0) * unit)
-    return tau
+    return phase.shear_modulus * (symmetric(b, s) - (b.sum() / 3.0) * unit) - (j * p) * unit
+
+
+@ti.func
+def viscous(phase, j, rate):
+    """2 min(J, 1) eta dev(D) [Pa]."""
+    mean = rate.trace() / 3.0 * ti.Matrix.identity(ti.f32, 3)
+    return (2.0 * ti.min(j, 1.0) * phase.viscosity) * (0.5 * (rate + rate.transpose()) - mean)
+
+
+@ti.func
+def given_to_nodes(grid, h, volume, tau):
+    """Momentum that a stress takes from a node per distance from the particle: 4 h V0 tau / dx^2."""
+    out = tau
+    for i, axis in ti.static(ti.ndrange(3, 3)):
+        out[i, axis] *= 4.0 * h * volume * grid.inv_dx[axis] * grid.inv_dx[axis]
+    return out
+
+
+@ti.func
+def gathered_from(grid, world, base, f, w, table: ti.template(), nodes: ti.template()):
+    """(sum of w v, the affine field C) of the velocities of a particle's 27 nodes; and the sums of w rho and of
+    w rho (x_node - x) in cells."""
+    total, density = vec3(0.0), 0.0
+    moment, lean = mat3(0.0), vec3(0.0)
+    for o, q in ti.ndrange(3, 3):
+        share = w[0, o] * w[1, q]
+        for r in ti.static(range(3)):
+            at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
+            node = share * w[2, r] * nodes[ti.max(at, 0)]
+            u = vec3(node[0], node[1], node[2])
+            total += u
+            density += node[3]
+            moment += u.outer_product(vec3(o, q, r) - f)
+            lean += node[3] * (vec3(o, q, r) - f)
+    for a, b in ti.static(ti.ndrange(3, 3)):
+        moment[a, b] *= 4.0 * grid.inv_dx[b]
+    return total, moment, density, lean
 
 
 @ti.kernel
@@ -114,20 +147,7 @@ def g2p(
             base = base_node(grid, x)
             f = (x - grid.origin) * grid.inv_dx - base
             w = weights(f)
-            gathered, density = vec3(0.0), 0.0
-            moment, lean = mat3(0.0), vec3(0.0)  # sums of w v (x_node - x) and of w rho (x_node - x) in cells
-            for o, q in ti.ndrange(3, 3):
-                share = w[0, o] * w[1, q]
-                for r in ti.static(range(3)):
-                    at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
-                    node = share * w[2, r] * moving[ti.max(at, 0)]
-                    u = vec3(node[0], node[1], node[2])
-                    gathered += u
-                    density += node[3]
-                    moment += u.outer_product(vec3(o, q, r) - f)
-                    lean += node[3] * (vec3(o, q, r) - f)
-            for a, b in ti.static(ti.ndrange(3, 3)):
-                moment[a, b] *= 4.0 * grid.inv_dx[b]
+            gathered, moment, density, lean = gathered_from(grid, world, base, f, w, table, moving)
             affine[p] = moment
             phase = phase_at(phases, world, phase_of[p])
             if held[p] == FREE:
@@ -144,6 +164,7 @@ def g2p(
             free = x + h * v
             if too_fast(v, grid.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
+                free = position[p]
             x = contained(grid, free)
             position[p] = x
             for axis in ti.static(range(3)):
@@ -173,6 +194,7 @@ def passes(alone: bool) -> SimpleNamespace:
         capacity: int,
         count: Ints,
         dt: Floats,
+        drags: int,
         phases: Phases,
         position: Vectors,
         velocity: Vectors,
@@ -181,6 +203,8 @@ def passes(alone: bool) -> SimpleNamespace:
         volume: Floats,
         phase_of: Ints,
         held: Ints,
+        row: Ints,
+        exit: Vectors,
         table: Ints,
         volume_ratio: Floats,
         elastic_normal: Vectors,
@@ -194,21 +218,25 @@ def passes(alone: bool) -> SimpleNamespace:
                 h, c = dt[world], affine[p]
                 phase = phase_at(phases, world, phase_of[p])
                 inertia = mass[p]
-                if held[p] == CLAMPED:
+                heavy = held[p] == CLAMPED
+                if held[p] == CARRIED and drags == 0:
+                    heavy = position[p][2] > exit[row[0]][2] + 1.5 * grid.dx[2]
+                if heavy:
                     inertia *= ANCHOR
                 a = mat3(0.0)  # momentum per distance from the particle
                 if held[p] == FREE:
                     a = inertia * near_walls(grid, position[p], c)
-                if held[p] != CARRIED:
+                if held[p] != CARRIED and h > 0.0:
                     j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
                     b, s = elastic_normal[p], elastic_shear[p]
                     if phase.shear_modulus > 0.0:
                         b, s, _ = strained(phase, phase.shear_modulus, c, b, s, h)
                         elastic_normal[p], elastic_shear[p] = b, s
                     volume_ratio[p] = j
-                    tau = kirchhoff(phase, j, b, s, c)
-                    for i, axis in ti.static(ti.ndrange(3, 3)):
-                        a[i, axis] -= 4.0 * h * volume[p] * grid.inv_dx[axis] * grid.inv_dx[axis] * tau[i, axis]
+                    tau = kirchhoff(phase, j, b, s)
+                    if drags == 1 and phase.viscosity > 0.0:
+                        tau += viscous(phase, j, c)
+                    a -= given_to_nodes(grid, h, volume[p], tau)
                 base = base_node(grid, position[p])
                 f = (position[p] - grid.origin) * grid.inv_dx - base
                 w = weights(f)

@@ -52,6 +52,7 @@ def p2g(
     capacity: int,
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
+    drags: int,
     phases: wp.array2d(dtype=Phase),
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -60,6 +61,8 @@ def p2g(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
+    row: wp.array(dtype=int),
+    exit: wp.array(dtype=wp.vec3),
     table: wp.array(dtype=int),
     # outputs
     volume_ratio: wp.array(dtype=float),
@@ -77,9 +80,22 @@ def p2g(
             return
         p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
     phase = phases[world, phase_of[p]]
-    m = inertia(mass[p], held[p])
+    m = inertia(grid, mass[p], held[p], position[p], drags, row, exit)
     a = stressed(
-        grid, dt[world], phase, p, on, position[p], affine, m, volume, held, volume_ratio, elastic_normal, elastic_shear
+        grid,
+        dt[world],
+        drags,
+        phase,
+        p,
+        on,
+        position[p],
+        affine,
+        m,
+        volume,
+        held,
+        volume_ratio,
+        elastic_normal,
+        elastic_shear,
     )
     base = first_node(grid, position[p])
     f, wx, wy, wz = weights(grid, position[p], base)
@@ -179,6 +195,53 @@ def grid_step(
         t += step
 
 
+@wp.func
+def sums_of(
+    nodes: wp.array(dtype=wp.vec4),
+    f: wp.vec3,
+    wx: wp.vec3,
+    wy: wp.vec3,
+    wz: wp.vec3,
+    bx: wp.vec3i,
+    by: wp.vec3i,
+    bz: wp.vec3i,
+    lx: wp.vec3i,
+    ly: wp.vec3i,
+    lz: wp.vec3i,
+    s0: int,
+    s1: int,
+    s2: int,
+    s3: int,
+    s4: int,
+    s5: int,
+    s6: int,
+    s7: int,
+):
+    """Row 0: the sum of w times what a particle's 27 nodes hold; rows 1 to 3: of w times that times the distance of a
+    node from the particle along x, y and z, in cells."""
+    u = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    cx, cy, cz = wp.vec4(0.0, 0.0, 0.0, 0.0), wp.vec4(0.0, 0.0, 0.0, 0.0), wp.vec4(0.0, 0.0, 0.0, 0.0)
+    for o in range(3):
+        low = bx[o] == bx[0]
+        t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
+        t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
+        plane = wp.vec4(0.0, 0.0, 0.0, 0.0)
+        for q in range(3):
+            near = by[q] == by[0]
+            u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
+            line = wp.vec4(0.0, 0.0, 0.0, 0.0)
+            for r in range(3):
+                slot = wp.where(bz[r] == bz[0], u0, u1)
+                node = wz[r] * load_vec4(nodes, wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r])
+                line += node
+                cz += (wx[o] * wy[q] * (float(r) - f[2])) * node
+            plane += wy[q] * line
+            cy += (wx[o] * wy[q] * (float(q) - f[1])) * line
+        u += wx[o] * plane
+        cx += (wx[o] * (float(o) - f[0])) * plane
+    return wp.matrix_from_rows(u, cx, cy, cz)
+
+
 @wp.kernel(launch_bounds=(BLOCK, GATHERING))
 def g2p(
     grid: Grid,
@@ -212,27 +275,7 @@ def g2p(
         f, wx, wy, wz = weights(grid, x, base)
         bx, by, bz, lx, ly, lz = node_parts(grid, base)
         s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
-        u = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        cx, cy, cz = wp.vec4(0.0, 0.0, 0.0, 0.0), wp.vec4(0.0, 0.0, 0.0, 0.0), wp.vec4(0.0, 0.0, 0.0, 0.0)
-        for o in range(3):
-            low = bx[o] == bx[0]
-            t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
-            t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
-            plane = wp.vec4(0.0, 0.0, 0.0, 0.0)
-            for q in range(3):
-                near = by[q] == by[0]
-                u0, u1 = wp.where(near, t0, t2), wp.where(near, t1, t3)
-                line = wp.vec4(0.0, 0.0, 0.0, 0.0)
-                for r in range(3):
-                    slot = wp.where(bz[r] == bz[0], u0, u1)
-                    node = wz[r] * load_vec4(moving, wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r])
-                    line += node
-                    cz += (wx[o] * wy[q] * (float(r) - f[2])) * node
-                plane += wy[q] * line
-                cy += (wx[o] * wy[q] * (float(q) - f[1])) * line
-            u += wx[o] * plane
-            cx += (wx[o] * (float(o) - f[0])) * plane
-        sums = wp.matrix_from_rows(u, cx, cy, cz)
+        sums = sums_of(moving, f, wx, wy, wz, bx, by, bz, lx, ly, lz, s0, s1, s2, s3, s4, s5, s6, s7)
         c = affine_of(grid, sums)
         affine[p] = c
         v = taken(p, x, sums, c, dt[world], outlet, row, exit, held, velocity, volume_ratio)

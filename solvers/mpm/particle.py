@@ -41,12 +41,12 @@ def columns_scaled(m: wp.mat33, by: wp.vec3):
 
 
 @wp.func
-def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocity_gradient: wp.mat33):
-    """Kirchhoff stress [Pa] from J, the elastic tensor (b: diagonal, s: xy, xz, yz) and the velocity gradient."""
+def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3):
+    """Kirchhoff stress [Pa] without viscosity, from J and the elastic tensor (b: diagonal, s: xy, xz, yz)."""
     p = volume_ratio * pressure(1.0 / volume_ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
     g = phase.shear_modulus
     m = g * (b[0] + b[1] + b[2]) / 3.0 + p
-    tau = wp.mat33(
+    return wp.mat33(
         g * b[0] - m,
         g * s[0],
         g * s[1],
@@ -57,12 +57,22 @@ def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3, velocit
         g * s[2],
         g * b[2] - m,
     )
-    if phase.viscosity > 0.0:
-        rate = 0.5 * (velocity_gradient + wp.transpose(velocity_gradient))
-        mean = wp.trace(rate) / 3.0
-        # A liquid that has cavitated (J > 1) must not break the bound on dt.
-        tau += (2.0 * wp.min(volume_ratio, 1.0) * phase.viscosity) * (rate - wp.diag(wp.vec3(mean, mean, mean)))
-    return tau
+
+
+@wp.func
+def viscous(phase: Phase, volume_ratio: float, velocity_gradient: wp.mat33):
+    """Viscous Kirchhoff stress [Pa]: 2 min(J, 1) eta dev(D). A liquid that has cavitated (J > 1) must not break the
+    bound on dt."""
+    rate = 0.5 * (velocity_gradient + wp.transpose(velocity_gradient))
+    mean = wp.trace(rate) / 3.0
+    return (2.0 * wp.min(volume_ratio, 1.0) * phase.viscosity) * (rate - wp.diag(wp.vec3(mean, mean, mean)))
+
+
+@wp.func
+def given_to_nodes(grid: Grid, dt: float, volume: float, tau: wp.mat33):
+    """What a stress takes, within dt, from a node one cell farther along each axis: columns of 4 dt V0 tau / dx^2 dx
+    [kg m/s] (Hu et al. 2018, eq. 18)."""
+    return columns_scaled(tau, (4.0 * dt * volume) * grid.inv_dx)
 
 
 @wp.func
@@ -76,9 +86,25 @@ def weights(grid: Grid, x: wp.vec3, base: wp.vec3i):
 
 
 @wp.func
-def inertia(mass: float, held: int):
-    """With which a particle takes part in the momentum of its nodes [kg]."""
-    return wp.where(held == CLAMPED, ANCHOR * mass, mass)
+def inertia(
+    grid: Grid,
+    mass: float,
+    held: int,
+    x: wp.vec3,
+    drags: int,
+    row: wp.array(dtype=int),
+    exit: wp.array(dtype=wp.vec3),
+):
+    """With which a particle takes part in the momentum of its nodes [kg].
+
+    What is carried gives its nodes its momentum anew in every step: that pushes as long as viscosity drags on them for
+    no longer than an explicit step. Where it is solved for (drags = 0) the piston lies as far above the exit as nodes
+    reach, yields to nothing, and what is carried below it passes its push on as the liquid that it is.
+    """
+    heavy = held == CLAMPED
+    if held == CARRIED and drags == 0:
+        heavy = x[2] > exit[row[0]][2] + 1.5 * grid.dx[2]
+    return wp.where(heavy, ANCHOR * mass, mass)
 
 
 @wp.func
@@ -104,6 +130,7 @@ def near_walls(grid: Grid, x: wp.vec3, c: wp.mat33):
 def stressed(
     grid: Grid,
     dt: float,
+    drags: int,
     phase: Phase,
     p: int,
     on: bool,
@@ -117,23 +144,27 @@ def stressed(
     elastic_shear: wp.array(dtype=wp.vec3),
 ):
     """Strain and stress of particle p in a step, kept if it is `on`; what it gives to a node one cell farther along
-    each axis beyond its momentum: the columns of (m C - 4 dt V0 tau / dx^2) dx [kg m/s] (Hu et al. 2018, eq. 18)."""
+    each axis beyond its momentum: the columns of (m C - 4 dt V0 tau / dx^2) dx [kg m/s] (Hu et al. 2018, eq. 18). At
+    dt = 0 nothing is strained."""
     c = affine[p]
     j = volume_ratio[p]
     b = elastic_normal[p]
     s = elastic_shear[p]
     a = wp.mat33()
     if held[p] == FREE:
-        a = m * near_walls(grid, x, c)
-    if held[p] != CARRIED and on:
+        a = columns_scaled(m * near_walls(grid, x, c), grid.dx)
+    if held[p] != CARRIED and on and dt > 0.0:
         j *= wp.max(1.0 + dt * wp.trace(c), 0.1)
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
             b, s, _kept = strained(phase, phase.shear_modulus, c, b, s, dt)
             elastic_normal[p] = b
             elastic_shear[p] = s
-        a -= columns_scaled(kirchhoff(phase, j, b, s, c), (4.0 * dt * volume[p]) * wp.cw_mul(grid.inv_dx, grid.inv_dx))
-    return columns_scaled(a, grid.dx)
+        tau = kirchhoff(phase, j, b, s)
+        if drags == 1 and phase.viscosity > 0.0:
+            tau += viscous(phase, j, c)
+        a -= given_to_nodes(grid, dt, volume[p], tau)
+    return a
 
 
 @wp.func
@@ -217,10 +248,12 @@ def moved(
     velocity: wp.array(dtype=wp.vec3),
     fault: wp.array(dtype=int),
 ):
-    """Move particle p on from x, walls stop it; returns its lowest node then."""
+    """Move particle p on from x, walls stop it; returns its lowest node then. What is astray stays: where a velocity
+    that is no number leads there are no nodes."""
     free = x + dt * v
     if too_fast(v, grid.top_speed):
         raise_fault(fault, FAULT_ASTRAY)
+        free = position[p]
     y = contained(grid, free)
     position[p] = y
     for axis in range(3):

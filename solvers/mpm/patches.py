@@ -12,7 +12,7 @@ from fluidbench.native.scene import Outlet, Phase
 
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
-from .particle import affine_of, inertia, moved, shifted, stressed, taken, weights
+from .particle import affine_of, given_to_nodes, inertia, moved, shifted, stressed, taken, viscous, weights
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -88,6 +88,41 @@ def taken_from_nodes(
     ...
 
 
+@wp.func
+def empty(homes: Homes, start: int):
+    """Empty the patch that begins there."""
+    for k in range(PATCH):
+        homes.patch[start + k] = wp.vec4(0.0, 0.0, 0.0, 0.0)
+
+
+@wp.func
+def fill(
+    grid: Grid,
+    homes: Homes,
+    h: int,
+    nodes: wp.array(dtype=wp.vec4),
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+):
+    """Copy what the nodes of a home's patch hold into it; returns the home's world."""
+    own = block_of[homes.slot[h]]
+    world = own / grid.blocks_per_world
+    block = coordinates(grid, own - world * grid.blocks_per_world)
+    for corner in range(8):
+        b, node, place, size = neighbour(grid, block, corner, 1)
+        slot = int(NOWHERE)
+        if b >= 0:
+            slot = table[b + world * grid.blocks_per_world] - 1
+        if slot >= 0:
+            for i in range(size[0]):
+                for j in range(size[1]):
+                    of = slot * 64 + ((node[0] + i) << 4) + ((node[1] + j) << 2) + node[2]
+                    at = h * PATCH + ((place[0] + i) * SIDE + place[1] + j) * SIDE + place[2]
+                    for k in range(size[2]):
+                        homes.patch[at + k] = nodes[of + k]
+    return world
+
+
 @wp.kernel
 def scatter(
     share: wp.vec3i,
@@ -96,6 +131,7 @@ def scatter(
     capacity: int,
     homes: Homes,
     dt: wp.array(dtype=float),
+    drags: int,
     phases: wp.array2d(dtype=Phase),
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -104,6 +140,8 @@ def scatter(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
+    row: wp.array(dtype=int),
+    exit: wp.array(dtype=wp.vec3),
     # outputs
     volume_ratio: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
@@ -113,16 +151,16 @@ def scatter(
     h, end = part_of(homes, index_of(share, wp.tid()), lanes)
     while h < end:
         start = h * PATCH
-        for k in range(PATCH):
-            homes.patch[start + k] = wp.vec4(0.0, 0.0, 0.0, 0.0)
+        empty(homes, start)
         for member in range(homes.first[h], homes.first[h] + homes.number[h]):
             p = homes.members[member]
             world = p / capacity
             phase = phases[world, phase_of[p]]
-            m = inertia(mass[p], held[p])
+            m = inertia(grid, mass[p], held[p], position[p], drags, row, exit)
             a = stressed(
                 grid,
                 dt[world],
+                drags,
                 phase,
                 p,
                 True,
@@ -207,21 +245,7 @@ def gather(
     h, end = part_of(homes, index_of(share, wp.tid()), lanes)
     while h < end:
         start = h * PATCH
-        own = block_of[homes.slot[h]]
-        world = own / grid.blocks_per_world
-        block = coordinates(grid, own - world * grid.blocks_per_world)
-        for corner in range(8):
-            b, node, place, size = neighbour(grid, block, corner, 1)
-            slot = int(NOWHERE)
-            if b >= 0:
-                slot = table[b + world * grid.blocks_per_world] - 1
-            if slot >= 0:
-                for i in range(size[0]):
-                    for j in range(size[1]):
-                        of = slot * 64 + ((node[0] + i) << 4) + ((node[1] + j) << 2) + node[2]
-                        at = start + ((place[0] + i) * SIDE + place[1] + j) * SIDE + place[2]
-                        for k in range(size[2]):
-                            homes.patch[at + k] = moving[of + k]
+        world = fill(grid, homes, h, moving, table, block_of)
         for member in range(homes.first[h], homes.first[h] + homes.number[h]):
             p = homes.members[member]
             x = position[p]
@@ -237,4 +261,49 @@ def gather(
                 activate_stencil(grid, world, after, table, block_of, active, fault)
                 if home_of(grid, after) != home_of(grid, base):
                     homes.outdated[0] = 1
+        h += 1
+
+
+@wp.kernel
+def resist(
+    share: wp.vec3i,
+    lanes: int,
+    grid: Grid,
+    capacity: int,
+    homes: Homes,
+    dt: wp.array(dtype=float),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    volume: wp.array(dtype=float),
+    volume_ratio: wp.array(dtype=float),
+    nodes: wp.array(dtype=wp.vec4),
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    # outputs
+    given: wp.array(dtype=wp.mat33),
+):
+    """What viscosity resists the velocities of the nodes with, to the patch of each home: dt A v (implicit.py)."""
+    h, end = part_of(homes, index_of(share, wp.tid()), lanes)
+    while h < end:
+        start = h * PATCH
+        world = fill(grid, homes, h, nodes, table, block_of)
+        for member in range(homes.first[h], homes.first[h] + homes.number[h]):
+            p = homes.members[member]
+            phase = phases[world, phase_of[p]]
+            a = wp.mat33()
+            if phase.viscosity > 0.0:
+                base = first_node(grid, position[p])
+                f, wx, wy, wz = weights(grid, position[p], base)
+                sums = taken_from_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, f)
+                tau = viscous(phase, volume_ratio[p], affine_of(grid, sums))
+                a = given_to_nodes(grid, dt[world], volume[p], tau)
+            given[p] = a
+        empty(homes, start)
+        for member in range(homes.first[h], homes.first[h] + homes.number[h]):
+            p = homes.members[member]
+            base = first_node(grid, position[p])
+            f, wx, wy, wz = weights(grid, position[p], base)
+            a = given[p]
+            add_to_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, -(a * f), 0.0, a)
         h += 1

@@ -24,14 +24,17 @@ from ..constitutive import STRETCHED
 from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
 from ..theory import mpm_numbers, stable_dt
+from ..viscosity import Scheme, Tolerance, accuracy, carried_by, footprint_of, implicit_is_cheaper
 from . import kernels_warp as kernels
 from .by_block import ByBlock
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
+from .implicit import GridViscosity
 from .particle import FAULT_STENCIL
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
 ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
 ISOLATED_VISCOUS = 0.25
+WORTH = 16.0  # times the substeps that explicit viscosity may take before implicit is cheaper, see physics.md
 
 
 class ConfigMPM(Config):
@@ -41,6 +44,10 @@ class ConfigMPM(Config):
     shifting: Annotated[float, Field(ge=0)] = Field(
         8.0, description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2"
     )
+    viscosity: Scheme = Field(
+        "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
+    )
+    viscous_tolerance: Tolerance = 1e-4
     blocks_per_particle: Annotated[float, Field(gt=0, le=8)] = Field(0.5, description="grid blocks to preallocate")
 
 
@@ -64,11 +71,20 @@ class SolverMPM(Solver):
     axes: ClassVar = (NumericalAxis("particles_per_cell", "grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-", 1 / 3),)
 
     @classmethod
+    def decided(cls, scenario: Scenario, config: Any) -> Any:
+        if config.viscosity != "auto":
+            return config
+        implicit = not scenario.domain.rubs and implicit_is_cheaper(cls, scenario, config, WORTH)
+        return config.model_copy(update={"viscosity": "implicit" if implicit else "explicit"})
+
+    @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
         blocks = blocks_of(scenario.domain, config.grid_ratio * scenario.spacing)
-        if blocks <= MAX_BLOCKS:
-            return None
-        return f"the domain holds {blocks:.3g} grid blocks; use a smaller domain or a larger spacing"
+        if blocks > MAX_BLOCKS:
+            return f"the domain holds {blocks:.3g} grid blocks; use a smaller domain or a larger spacing"
+        if config.viscosity == "implicit" and scenario.domain.rubs:
+            return "its walls have friction, which implicit viscosity knows nothing of; use viscosity = 'explicit'"
+        return None
 
     @classmethod
     def memory(cls, scenario: Scenario, config: Any, particles: int) -> float:
@@ -91,7 +107,8 @@ class SolverMPM(Solver):
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
         dx = float(cells_of(scenario.domain, config.grid_ratio * scenario.spacing)[1].min())
         acoustic = ISOLATED_ACOUSTIC * dx / (scenario.wave_speed + speed)
-        nu = scenario.material.viscosity / scenario.material.density
+        implicit = config.viscosity == "implicit"
+        nu = 0.0 if implicit else scenario.material.viscosity / scenario.material.density
         viscous = ISOLATED_VISCOUS * dx * dx / nu if nu > 0 else math.inf
         a = config.safety
         limits = [
@@ -100,6 +117,8 @@ class SolverMPM(Solver):
             ),
             Bound("advective", config.advection * dx / max(speed, 1e-12), f"{config.advection:g} dx / v", "one cell"),
         ]
+        if implicit and scenario.material.viscosity > 0:
+            limits.append(accuracy(scenario))
         if nu > 0:
             limits += [
                 Bound("viscous", a * viscous, f"{a:g} dx^2 / (4 nu)", "references.md, H: isolated particle, exact"),
@@ -115,12 +134,13 @@ class SolverMPM(Solver):
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
-        self.threads = threads
+        self.alone = scene.device.is_cpu and threads == 1
         self.kernels = self.kernels_of(backend)
         self.grid = grid_of(scene, config.grid_ratio * scene.spacing)
         self.shifting = 0.0 if scene.expands else config.shifting  # mass does not tell how full a node is, then
         blocks = self.grid.blocks_per_world * scene.worlds
         slots = min(blocks, 512 + int(config.blocks_per_particle * pool.size))
+        implicit = scene.viscous and config.viscosity == "implicit"
         pool.add_field("affine", wp.mat33)
         pool.add_field("volume_ratio", float, 1.0, within=(1.0 / STRETCHED, STRETCHED))
         pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
@@ -135,16 +155,17 @@ class SolverMPM(Solver):
         self.order = CellOrder(
             scene, pool, np.array(self.grid.dx), shift=0.5
         )  # particles of one cell share their 27 nodes
-        self.by_block = ByBlock(scene, pool, slots) if scene.device.is_cpu and backend == "warp" else None
+        self.by_block = ByBlock(scene, pool, slots, implicit) if scene.device.is_cpu and backend == "warp" else None
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
+        self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
         if backend == "taichi":
             from . import kernels_taichi
 
-            return kernels_taichi.passes(alone=self.scene.device.is_cpu and self.threads == 1)
+            return kernels_taichi.passes(self.alone)
         return kernels.passes()
 
     def refresh(self) -> None:
@@ -202,12 +223,20 @@ class SolverMPM(Solver):
         )
 
     def clear_grid(self) -> None:
-        self._launch("clear_grid", self.node_lanes, [self.active, self.node_lanes], [self.raw])
+        self.empty(self.raw)
+
+    def empty(self, nodes: wp.array) -> None:
+        self._launch("clear_grid", self.node_lanes, [self.active, self.node_lanes], [nodes])
 
     def p2g(self) -> None:
-        pool, scene = self.pool, self.scene
+        self.scatter(self.scene.dt, self.raw)
+
+    def scatter(self, dt: wp.array, raw: wp.array) -> None:
+        """Strain and stress within dt, momentum and mass to nodes that are empty."""
+        pool, scene, drags = self.pool, self.scene, int(self.viscosity is None)
+        hours = scene.clock.hours
         if self.by_block is not None:
-            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, self.raw)
+            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, dt, drags, raw)
             return
         self._launch(
             "p2g",
@@ -216,7 +245,8 @@ class SolverMPM(Solver):
                 self.grid,
                 pool.capacity,
                 pool.count,
-                scene.dt,
+                dt,
+                drags,
                 scene.phases,
                 pool.position,
                 pool.velocity,
@@ -225,27 +255,36 @@ class SolverMPM(Solver):
                 pool.volume,
                 pool.phase,
                 pool.held,
+                hours.row,
+                hours.exit,
                 self.table,
             ],
-            [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, self.raw, pool.fault],
+            [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, raw, pool.fault],
         )
 
     def grid_step(self) -> None:
-        scene = self.scene
-        self._launch(
-            "grid_step",
-            self.node_lanes,
-            [
-                self.grid,
-                self.node_lanes,
-                self.active,
-                self.block_of,
-                self.table,
-                self.raw,
-                scene.dt,
-                scene.force,
-            ],
-            [self.moving],
+        self.walled(self.raw, self.scene.force, self.moving)
+        if self.viscosity is not None:
+            self.viscosity.solve()
+
+    def walled(self, raw: wp.array, force: wp.array, moving: wp.array) -> None:
+        """Velocities of nodes from their momenta and masses, a force for dt, and walls."""
+        lanes = [self.grid, self.node_lanes, self.active, self.block_of, self.table]
+        self._launch("grid_step", self.node_lanes, [*lanes, raw, self.scene.dt, force], [moving])
+
+    def resist(self, nodes: wp.array, image: wp.array) -> None:
+        """What viscosity resists the velocities of nodes with, added to momenta: dt A v of implicit.py."""
+        pool, scene = self.pool, self.scene
+        if self.by_block is not None:
+            self.by_block.resist(self.grid, self.table, self.block_of, self.active, nodes, image)
+            return
+        assert self.viscosity is not None
+        matter = [pool.phase, pool.position, pool.volume, pool.volume_ratio]
+        self.backend.launch(
+            self.viscosity.kernels.resist,
+            pool.size,
+            [self.grid, pool.capacity, pool.count, scene.dt, scene.phases, *matter, self.table, nodes],
+            [image],
         )
 
     def g2p(self) -> None:
@@ -288,6 +327,8 @@ class SolverMPM(Solver):
             self.scene.crew.load(aging)
         self.order.prepare()
         self.backend.prepare(self)
+        if self.viscosity is not None and self.backend.name == "warp":
+            self.scene.crew.load(self.viscosity.kernels.guess.module)
         if self.by_block is not None:
             self.by_block.prepare()
         self.started = False
@@ -295,6 +336,12 @@ class SolverMPM(Solver):
     def resume(self) -> None:
         """The blocks of the grid are found anew; the affine field is that of the checkpoint."""
         self.started, self.pool.stale = True, True
+
+    def carried(self) -> dict[str, Any]:
+        return carried_by(self.viscosity)
+
+    def solves(self) -> dict[str, float]:
+        return {} if self.viscosity is None else self.viscosity.iterations.effort()
 
     def sort_keys(self) -> Any:
         return self.order.keys()
@@ -323,4 +370,4 @@ class SolverMPM(Solver):
     def footprint(self) -> dict[str, int]:
         names = ("table", "block_of", "raw", "moving")
         more = {} if self.by_block is None else self.by_block.footprint()
-        return {name: getattr(self, name).capacity for name in names} | more
+        return {name: getattr(self, name).capacity for name in names} | more | footprint_of(self.viscosity)

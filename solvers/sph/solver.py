@@ -368,7 +368,7 @@ class SolverSPH(Solver):
         return self.order.keys()
 
     def solves(self) -> dict[str, float]:
-        return {} if self.viscosity is None else self.viscosity.effort()
+        return {} if self.viscosity is None else self.viscosity.iterations.effort()
 
     def densities(self) -> np.ndarray:
         return self.pool.density.numpy()

@@ -113,7 +113,17 @@ def test_resume_after_a_kill(tmp_path):
 
 def test_a_run_that_cannot_make_it_is_a_timeout_not_a_result(tmp_path):
     done = fluidbench(
-        "run", "line_bead", *TINY, "--set", "material.viscosity=1e4", "--wall-limit", "3", "--out", str(tmp_path)
+        "run",
+        "line_bead",
+        *TINY,
+        "--set",
+        "material.viscosity=1e4",
+        "--set",
+        "numerics.mpm.viscosity=explicit",
+        "--wall-limit",
+        "3",
+        "--out",
+        str(tmp_path),
     )
     (record,) = tmp_path.glob("runs/*/record.json")
     record = json.loads(record.read_text())

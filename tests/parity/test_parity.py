@@ -66,7 +66,8 @@ def tank(material, walls=WALLS, depth=0.08, **more):
 
 
 # One iteration more or less is a difference of the tolerance.
-SOLVED = {"sph": {"viscosity": "implicit", "viscous_tolerance": 1e-6}, "pbd": {"viscous_tolerance": 1e-6}}
+IMPLICIT = {"viscosity": "implicit", "viscous_tolerance": 1e-6}
+SOLVED = {"mpm": IMPLICIT, "sph": IMPLICIT, "pbd": {"viscous_tolerance": 1e-6}}
 SOLID = {"density": 1000.0, "youngs_modulus": 2e4}
 CASES = {
     "liquid": tank({"density": 1000.0}),
@@ -88,9 +89,11 @@ ALWAYS = {
 
 
 def case(name, method):
-    """The case; PBD takes no solid that is fed in."""
+    """The case; PBD takes no solid that is fed in, MPM's implicit viscosity no rough wall."""
     if (name, method) == ("solid", "pbd"):
         return tank(SOLID, CLOSED, nozzle=None, toolpath=None)
+    if (name, method) == ("thick", "mpm"):
+        return tank({"density": 1000.0, "viscosity": 50.0}, CLOSED | {"y_upper": "slip"}, numerics=SOLVED)
     return CASES[name]
 
 

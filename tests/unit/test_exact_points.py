@@ -11,6 +11,7 @@ from fluidbench.method.contract import Steps
 from fluidbench.method.target import Target
 from fluidbench.method.vitals import Vital
 from fluidbench.registry import get_method
+from fluidbench.scenario.numerics import configure
 from fluidbench.study import limits, points, stability
 from fluidbench.study.case import Finding, Number
 from fluidbench.study.limits import Limit, default_dt
@@ -87,7 +88,7 @@ def test_the_opening_is_two_thousand_substeps_or_all(monkeypatch, ticks, each, t
 
     class Opened:
         def __init__(self, opened, config, target):
-            assert (opened, config, target) == (s, get_method("mpm").Config(), Target())
+            assert (opened, config, target) == (s, configure(get_method("mpm"), s), Target())
             self.now, self.done, self.looks = 0.0, 0, 0
             made.append(self)
 

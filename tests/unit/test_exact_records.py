@@ -244,7 +244,8 @@ def test_a_refusal_is_recorded_without_a_child(tmp_path, monkeypatch):
     hooks = Hooks(
         lambda i, j, reused: ticks.append(reused), lambda *_: None, lambda i, r: ticks.append(r.verdict), ticks.append
     )
-    thick = Job(TABLE | {"material": TABLE["material"] | {"viscosity": 1e6}}, "mpm")
+    explicit = {"numerics": {"mpm": {"viscosity": "explicit"}}}
+    thick = Job(TABLE | {"material": TABLE["material"] | {"viscosity": 1e6}} | explicit, "mpm")
     (made,) = execute([thick], Store(tmp_path), hooks)
     assert (made.verdict, made.reused, made.ok) == ("refused", False, False) and "single precision" in made.reason
     (again,) = execute([thick], Store(tmp_path), hooks)

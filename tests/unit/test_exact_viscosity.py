@@ -224,8 +224,8 @@ def test_worlds_and_threads_change_nothing(method):
     both.scene.set_dt(1e-2)
     both.solver.lists()
     assert (before + 1e-2 * acceleration(both)[: len(before)] == expected).all()
-    assert both.solver.viscosity.effort(0) == went
-    assert 0 < both.solver.viscosity.effort(1)["iterations"] < went["iterations"]
+    assert both.solver.viscosity.iterations.effort(0) == went
+    assert 0 < both.solver.viscosity.iterations.effort(1)["iterations"] < went["iterations"]
 
 
 @pytest.mark.parametrize("backend", ["warp", "taichi"])
@@ -263,7 +263,7 @@ def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(method):
 
 def test_a_solve_that_may_not_go_on_says_so():
     simulation = block("sph", made(1e7), tolerance=1e-6)
-    simulation.solver.viscosity.ending.most = 3
+    simulation.solver.viscosity.iterations.ending.most = 3
     _, went = solved(simulation, noise(simulation), 1e-2)
     assert went["iterations"] == 3 and went["unconverged"] == 1.0 and went["residual"] > 1e-6
 

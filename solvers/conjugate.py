@@ -1,0 +1,72 @@
+"""What decides how long conjugate gradients go on, and what they have taken: all of it on the device."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import warp as wp
+
+from .backends import Backend
+from .conjugate_warp import TEAM, Ending, Totals
+
+MOST = 400  # iterations of one solve: a thousandfold of an explicit step takes some hundred
+
+
+class Iterations:
+    """The iterations of solves in several worlds at once, each with sums and an end of its own."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        kernels: SimpleNamespace,
+        tolerance: float,
+        begin: wp.array,
+        partial: wp.array,
+    ) -> None:
+        """`tolerance` is of the residual over what is solved for [-]; a world's sums are those of partial[begin[world]]
+        and so on, to begin[world + 1]."""
+        self.backend, self.kernels, self.begin, self.partial = backend, kernels, begin, partial
+        self.ending = Ending()
+        self.ending.tolerance, self.ending.most = tolerance, MOST
+        worlds = self.worlds = len(begin) - 1
+        self.team = 1 if wp.get_device(begin.device).is_cpu else TEAM
+        with wp.ScopedDevice(begin.device):
+            self.totals, self.going = wp.zeros(worlds, dtype=Totals), wp.zeros(1, dtype=int)
+            self.counted, self.worst = wp.zeros((worlds, 3), dtype=int), wp.zeros(worlds, dtype=float)
+
+    def begin_with(self) -> None:
+        """Enqueue: m r.r and m v*.v* are summed up."""
+        self._weigh("weigh_start")
+
+    def repeat(self, body: Callable[[], None]) -> None:
+        """Enqueue iterations until all worlds are solved, or know that they will not be; note what they took."""
+        self.backend.repeat(self.going, body)
+        inputs = [self.ending, self.totals]
+        self.backend.launch(self.kernels.note, self.worlds, inputs, [self.going, self.counted, self.worst])
+
+    def step(self) -> None:
+        """Enqueue: how far to go along the direction, of which p.Kp is summed up."""
+        self._weigh("weigh_step")
+
+    def turn(self) -> None:
+        """Enqueue: how much of the direction to keep, and whether to go on; r.r is summed up."""
+        self._weigh("weigh_turn")
+
+    def _weigh(self, name: str) -> None:
+        inputs = [self.ending, self.begin, self.team, self.partial]
+        self.backend.launch(getattr(self.kernels, name), self.worlds * self.team, inputs, [self.totals, self.going])
+
+    def carried(self) -> dict[str, wp.array]:
+        """What a checkpoint must hold."""
+        return {"counted": self.counted, "worst": self.worst}
+
+    def effort(self, world: int = 0) -> dict[str, float]:
+        """Iterations a solve, largest residual over v*, share of solves that did not converge; nothing before the
+        first."""
+        solves, iterations, unconverged = (int(n) for n in self.counted.numpy()[world])
+        if not solves:
+            return {}
+        return {
+            "iterations": iterations / solves,
+            "residual": float(self.worst.numpy()[world]),
+            "unconverged": unconverged / solves,
+        }
