@@ -154,9 +154,9 @@ class Scene:
         phase.relaxation_rate = 0.0 if material.relaxation_time is None else 1.0 / material.relaxation_time
         phase.flow_index = material.flow_index
         phase.tait = 1.0 if material.equation_of_state == "tait" else 0.0
-        # Unless told, a liquid cavitates rather than carry tension, but for that of its own viscosity where it is fed;
-        # what has shear stiffness holds together.
-        limit = scenario.feeding_pressure if material.youngs_modulus is None else NEVER_YIELDS
+        # Unless told, a liquid cavitates rather than carry tension, but for that of its own viscosity; what has shear
+        # stiffness holds together.
+        limit = scenario.viscous_tension if material.youngs_modulus is None else NEVER_YIELDS
         phase.tension_limit = limit if material.tension_limit is None else min(material.tension_limit, NEVER_YIELDS)
         return phase
 

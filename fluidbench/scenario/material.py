@@ -30,8 +30,8 @@ class Material(Model):
     bulk_modulus: Positive | None = Field(None, description="bulk modulus K [Pa]; overrides K from E and nu")
     tension_limit: NonNegative | None = Field(
         None,
-        description="tension at which it cavitates [Pa]; else a liquid does at 0, or at viscosity times speed over "
-        "diameter of what a nozzle feeds, and what has strength never",
+        description="tension at which it cavitates [Pa]; else a liquid does at what its own viscosity pulls with, "
+        "what has strength never",
     )
     equation_of_state: Literal["linear", "tait"] = Field("linear", description="pressure law; Tait has gamma = 7")
     cure: Cure | None = Field(None, description="how it cures after it left the nozzle")

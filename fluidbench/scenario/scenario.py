@@ -284,6 +284,14 @@ class Scenario(Model):
         return self.material.viscosity * speed / self.nozzle.diameter
 
     @property
+    def viscous_tension(self) -> float:
+        """With which a liquid's own viscosity pulls it apart [Pa]: that of what is fed, or eta U / L of the reference
+        speed across the narrowest body, which is no more than what drives it, rho U^2."""
+        m, speed = self.material, self.reference_speed
+        free = 0.0 if not self.bodies else m.viscosity * speed / self.narrowest
+        return max(self.feeding_pressure, min(free, m.density * speed**2))
+
+    @property
     def wave_speed(self) -> float:
         """Longitudinal wave speed of the fresh material [m/s]."""
         return self.material.wave_speed(self.liquid_sound_speed)

@@ -179,6 +179,17 @@ def test_a_liquid_is_as_stiff_as_what_pushes_it():
     assert Scene(told).phases.numpy()["tension_limit"] == 7.0
     hardened = thick.made_of(thick.material.model_copy(update={"viscosity": 1e6}))
     assert hardened.feeding_pressure == thick.feeding_pressure and hardened.wave_speed == thick.wave_speed
-    assert scenario(material={"density": 1000.0, "viscosity": 1e6}).feeding_pressure == 0.0
     soft = bead(material={"density": 1400.0, "viscosity": 300.0, "bulk_modulus": 3e4})
     assert any("expect visible compression" in w for w in soft.warnings()) and not thick.warnings()
+
+
+@pytest.mark.parametrize(("viscosity", "tension"), [(0.0, 0.0), (1.0, 1.0 * 1.0 / 0.5), (1e6, 1000.0 * 1.0)])
+def test_a_liquid_carries_the_tension_of_its_own_viscosity(viscosity, tension):
+    """A block 0.5 m across and 1 m high that falls at sqrt(g H) = 1 m/s: eta U / L, and no more than rho U^2."""
+    block = {"kind": "box", "center": [1.0, 1.0, 0.5], "size": [0.5, 1.0, 1.0]}
+    domain = {"lower": [0, 0, 0], "upper": [2, 2, 2]}
+    table = {"domain": domain, "bodies": [block], "gravity": [0, 0, -1.0], "spacing": 0.1}
+    s = scenario(**table, material={"density": 1000.0, "viscosity": viscosity})
+    assert s.reference_speed == pytest.approx(1.0) and s.feeding_pressure == 0.0
+    assert s.viscous_tension == pytest.approx(tension)
+    assert Scene(s).phases.numpy()["tension_limit"] == pytest.approx(tension)
