@@ -35,7 +35,7 @@ from .grid_taichi import (
     wrapped,
 )
 from .implicit_warp import PART, PARTS
-from .kernels_taichi import gathered_from, given_to_nodes, viscous, weights
+from .kernels_taichi import gathered_from, resistance_of, viscous, weights
 
 
 @ti.func
@@ -247,7 +247,7 @@ def passes(alone: bool) -> SimpleNamespace:
                     f = (position[p] - grid.origin) * grid.inv_dx - base
                     w = weights(f)
                     _, rate, _, _ = gathered_from(grid, world, base, f, w, table, nodes)
-                    a = given_to_nodes(grid, dt[world], volume[p], viscous(phase, volume_ratio[p], rate))
+                    a = resistance_of(grid, dt[world], volume[p], viscous(phase, volume_ratio[p], rate))
                     for o, q in ti.ndrange(3, 3):
                         for r in ti.static(range(3)):
                             at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)

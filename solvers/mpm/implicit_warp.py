@@ -15,7 +15,7 @@ from fluidbench.native.vector_access import in_company
 from ..conjugate_warp import Totals, note, weigh_start, weigh_step, weigh_turn
 from .grid import Grid, first_node, node_of, node_parts, slots_of, turns
 from .kernels_warp import sums_of
-from .particle import affine_of, given_to_nodes, viscous, weights
+from .particle import affine_of, resistance_of, viscous, weights
 from .together import scatter_together, stencil
 from .walls import flipped, mirror, wall_kind, wall_velocity
 
@@ -325,7 +325,7 @@ def resist(
     a = wp.mat33()
     if on:
         sums = sums_of(nodes, f, wx, wy, wz, bx, by, bz, lx, ly, lz, s0, s1, s2, s3, s4, s5, s6, s7)
-        a = given_to_nodes(grid, dt[world], volume[p], viscous(phase, volume_ratio[p], affine_of(grid, sums)))
+        a = resistance_of(grid, dt[world], volume[p], viscous(phase, volume_ratio[p], affine_of(grid, sums)))
     if not on and not in_company():
         return
     scatter_together(

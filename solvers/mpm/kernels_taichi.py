@@ -87,7 +87,7 @@ def viscous(phase, j, rate):
 
 
 @ti.func
-def given_to_nodes(grid, h, volume, tau):
+def resistance_of(grid, h, volume, tau):
     """Momentum that a stress takes from a node per distance from the particle: 4 h V0 tau / dx^2."""
     out = tau
     for i, axis in ti.static(ti.ndrange(3, 3)):
@@ -236,7 +236,7 @@ def passes(alone: bool) -> SimpleNamespace:
                     tau = kirchhoff(phase, j, b, s)
                     if drags == 1 and phase.viscosity > 0.0:
                         tau += viscous(phase, j, c)
-                    a -= given_to_nodes(grid, h, volume[p], tau)
+                    a -= resistance_of(grid, h, volume[p], tau)
                 base = base_node(grid, position[p])
                 f = (position[p] - grid.origin) * grid.inv_dx - base
                 w = weights(f)

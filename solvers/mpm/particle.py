@@ -69,9 +69,9 @@ def viscous(phase: Phase, volume_ratio: float, velocity_gradient: wp.mat33):
 
 
 @wp.func
-def given_to_nodes(grid: Grid, dt: float, volume: float, tau: wp.mat33):
-    """What a stress takes, within dt, from a node one cell farther along each axis: columns of 4 dt V0 tau / dx^2 dx
-    [kg m/s] (Hu et al. 2018, eq. 18)."""
+def resistance_of(grid: Grid, dt: float, volume: float, tau: wp.mat33):
+    """By how much more a stress resists, within dt, the motion of a node one cell farther along each axis: the columns
+    of 4 dt V0 tau / dx^2 dx [kg m/s] (Hu et al. 2018, eq. 18)."""
     return columns_scaled(tau, (4.0 * dt * volume) * grid.inv_dx)
 
 
@@ -163,7 +163,7 @@ def stressed(
         tau = kirchhoff(phase, j, b, s)
         if drags == 1 and phase.viscosity > 0.0:
             tau += viscous(phase, j, c)
-        a -= given_to_nodes(grid, dt, volume[p], tau)
+        a -= resistance_of(grid, dt, volume[p], tau)
     return a
 
 

@@ -12,7 +12,7 @@ from fluidbench.native.scene import Outlet, Phase
 
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
-from .particle import affine_of, given_to_nodes, inertia, moved, shifted, stressed, taken, viscous, weights
+from .particle import affine_of, inertia, moved, resistance_of, shifted, stressed, taken, viscous, weights
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -297,7 +297,7 @@ def resist(
                 f, wx, wy, wz = weights(grid, position[p], base)
                 sums = taken_from_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, f)
                 tau = viscous(phase, volume_ratio[p], affine_of(grid, sums))
-                a = given_to_nodes(grid, dt[world], volume[p], tau)
+                a = resistance_of(grid, dt[world], volume[p], tau)
             given[p] = a
         empty(homes, start)
         for member in range(homes.first[h], homes.first[h] + homes.number[h]):
