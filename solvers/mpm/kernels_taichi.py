@@ -226,13 +226,14 @@ def passes(alone: bool) -> SimpleNamespace:
                 a = mat3(0.0)  # momentum per distance from the particle
                 if held[p] == FREE:
                     a = inertia * near_walls(grid, position[p], c)
+                j, b, s = volume_ratio[p], elastic_normal[p], elastic_shear[p]
                 if held[p] != CARRIED and h > 0.0:
-                    j = volume_ratio[p] * ti.max(1.0 + h * c.trace(), 0.1)
-                    b, s = elastic_normal[p], elastic_shear[p]
+                    j *= ti.max(1.0 + h * c.trace(), 0.1)
                     if phase.shear_modulus > 0.0:
                         b, s, _ = strained(phase, phase.shear_modulus, c, b, s, h)
                         elastic_normal[p], elastic_shear[p] = b, s
                     volume_ratio[p] = j
+                if h > 0.0 and (held[p] != CARRIED or drags == 0):
                     tau = kirchhoff(phase, j, b, s)
                     if drags == 1 and phase.viscosity > 0.0:
                         tau += viscous(phase, j, c)

@@ -99,7 +99,7 @@ def inertia(
 
     What is carried gives its nodes its momentum anew in every step: that pushes as long as viscosity drags on them for
     no longer than an explicit step. Where it is solved for (drags = 0) the piston lies as far above the exit as nodes
-    reach, yields to nothing, and what is carried below it passes its push on as the liquid that it is.
+    reach and yields to nothing; what is carried below it passes its push on by the pressure and viscosity of a liquid.
     """
     heavy = held == CLAMPED
     if held == CARRIED and drags == 0:
@@ -160,6 +160,7 @@ def stressed(
             b, s, _kept = strained(phase, phase.shear_modulus, c, b, s, dt)
             elastic_normal[p] = b
             elastic_shear[p] = s
+    if on and dt > 0.0 and (held[p] != CARRIED or drags == 0):
         tau = kirchhoff(phase, j, b, s)
         if drags == 1 and phase.viscosity > 0.0:
             tau += viscous(phase, j, c)
