@@ -220,7 +220,8 @@ def passes(alone: bool) -> SimpleNamespace:
                 inertia = mass[p]
                 heavy = held[p] == CLAMPED
                 if held[p] == CARRIED and drags == 0:
-                    heavy = position[p][2] > exit[row[0]][2] + 1.5 * grid.dx[2]
+                    z, reach = position[p][2], 1.5 * grid.dx[2]
+                    heavy = z > exit[row[0]][2] + reach and z < grid.upper[2] - reach
                 if heavy:
                     inertia *= ANCHOR
                 a = mat3(0.0)  # momentum per distance from the particle

@@ -100,10 +100,12 @@ def inertia(
     What is carried gives its nodes its momentum anew in every step: that pushes as long as viscosity drags on them for
     no longer than an explicit step. Where it is solved for (drags = 0) the piston lies as far above the exit as nodes
     reach and yields to nothing; what is carried below it passes its push on by the pressure and viscosity of a liquid.
+    (Not beneath a ceiling whose nodes it would share: these do not move.)
     """
     heavy = held == CLAMPED
     if held == CARRIED and drags == 0:
-        heavy = x[2] > exit[row[0]][2] + 1.5 * grid.dx[2]
+        reach = 1.5 * grid.dx[2]
+        heavy = x[2] > exit[row[0]][2] + reach and x[2] < grid.upper[2] - reach
     return wp.where(heavy, ANCHOR * mass, mass)
 
 

@@ -253,12 +253,14 @@ def inertia_of(
         (CARRIED, 9.0, 1, 1.0),
         (CARRIED, 5.0 + 1.4 * 2.0, 0, 1.0),
         (CARRIED, 5.0 + 1.6 * 2.0, 0, 1e4),
+        (CARRIED, 20.0 - 1.6 * 2.0, 0, 1e4),
+        (CARRIED, 20.0 - 1.4 * 2.0, 0, 1.0),
         (CLAMPED, 0.0, 1, 1e4),
     ],
 )
 def test_the_piston_yields_to_nothing_where_viscosity_is_solved_for(held, height, drags, weight):
-    """The exit at 5 m, cells of 2 m."""
-    grid = block(made(1.0)).solver.grid
+    """The exit at 5 m, a ceiling at 20 m, cells of 2 m."""
+    grid = block(made(1.0, height=20.0)).solver.grid
     row, exit_ = wp.array([1], dtype=int), wp.array([[0, 0, 0], [0, 0, 5.0]], dtype=wp.vec3)
     found = wp.zeros(1, dtype=float)
     wp.launch(inertia_of, 1, [grid, int(held), wp.vec3(0.0, 0.0, height), drags, row, exit_], [found])
