@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from types import SimpleNamespace
+from typing import ClassVar, Protocol
 
 import warp as wp
 
@@ -55,10 +56,6 @@ class Iterations:
         inputs = [self.ending, self.begin, self.team, self.partial]
         self.backend.launch(getattr(self.kernels, name), self.worlds * self.team, inputs, [self.totals, self.going])
 
-    def carried(self) -> dict[str, wp.array]:
-        """What a checkpoint must hold."""
-        return {"counted": self.counted, "worst": self.worst}
-
     def effort(self, world: int = 0) -> dict[str, float]:
         """Iterations a solve, largest residual over v*, share of solves that did not converge; nothing before the
         first."""
@@ -70,3 +67,25 @@ class Iterations:
             "residual": float(self.worst.numpy()[world]),
             "unconverged": unconverged / solves,
         }
+
+
+class Solve(Protocol):
+    """What a method solves for by these iterations; it may solve for nothing (None)."""
+
+    OWN: ClassVar[tuple[str, ...]]  # its arrays
+    iterations: Iterations
+
+
+def carried_by(solve: Solve | None) -> dict[str, wp.array]:
+    """What a checkpoint must hold of it."""
+    return {} if solve is None else {"counted": solve.iterations.counted, "worst": solve.iterations.worst}
+
+
+def effort_of(solve: Solve | None) -> dict[str, float]:
+    """What it has taken, in the first world."""
+    return {} if solve is None else solve.iterations.effort()
+
+
+def footprint_of(solve: Solve | None) -> dict[str, int]:
+    """Bytes that it takes beside the pool."""
+    return {} if solve is None else {f"viscous_{name}": getattr(solve, name).capacity for name in solve.OWN}

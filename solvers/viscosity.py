@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import warp as wp
 from pydantic import Field
@@ -47,18 +47,20 @@ WORTH = 6.0  # times the substeps that explicit viscosity on pairs may take befo
 RESOLVED, OVER = 0.1, 5e-3  # of the slowest viscous decay, and of the time across matter, that a step may take
 
 
-def implicit_is_cheaper(method: Any, scenario: Scenario, config: Any, worth: float = WORTH) -> bool:
-    """Whether the bounds of the most viscous matter of a run say that implicit viscosity is cheaper: that explicit
-    takes more than `worth` times as many substeps."""
+def decided(method: Any, scenario: Scenario, config: Any, worth: float = WORTH) -> Any:
+    """The settings with `auto` decided by the bounds of the most viscous matter of a run: implicit where explicit takes
+    more than `worth` times as many substeps."""
+    if config.viscosity != "auto":
+        return config
     thickest = max(scenario.aged[1], key=lambda m: m.viscosity)
-    if thickest.viscosity == 0.0:
-        return False
     made = scenario.made_of(thickest)
-    steps = []
-    for scheme in ("explicit", "implicit"):
-        bounds = method.bounds(made, config.model_copy(update={"viscosity": scheme}), made.reference_speed)
-        steps.append(min(made.schedule[0], *(b.dt for b in bounds)))
-    return bool(steps[0] * worth < steps[1])
+    tried = {scheme: config.model_copy(update={"viscosity": scheme}) for scheme in ("explicit", "implicit")}
+    steps = {
+        scheme: min(made.schedule[0], *(b.dt for b in method.bounds(made, told, made.reference_speed)))
+        for scheme, told in tried.items()
+    }
+    cheaper = thickest.viscosity > 0.0 and steps["explicit"] * worth < steps["implicit"]
+    return tried["implicit" if cheaper else "explicit"]
 
 
 def accuracy(scenario: Scenario) -> Bound:
@@ -75,20 +77,10 @@ def accuracy(scenario: Scenario) -> Bound:
     )
 
 
-def carried_by(viscosity: Any) -> dict[str, wp.array]:
-    """What a checkpoint must hold of it."""
-    return {} if viscosity is None else viscosity.iterations.carried()
-
-
-def footprint_of(viscosity: Any) -> dict[str, int]:
-    """Bytes that it takes beside the pool."""
-    return {} if viscosity is None else {f"viscous_{name}": getattr(viscosity, name).capacity for name in viscosity.OWN}
-
-
 class ImplicitViscosity:
     """What solves for the velocity of a pool under its viscosity; one a solver, everything allocated at once."""
 
-    OWN = ("rows", "aim", "trial", "image", "residual", "partial")
+    OWN: ClassVar[tuple[str, ...]] = ("rows", "aim", "trial", "image", "residual", "partial")
 
     def __init__(
         self,

@@ -234,8 +234,8 @@ class Scenario(Model):
         """The fastest speed that the scenario itself implies [m/s]: initial, extruded, expanding, or sqrt(g H)."""
         g = float(np.linalg.norm(self.acceleration))
         speeds, height = [1e-3], 0.0
-        if self.nozzle is not None and self.toolpath is not None and self.track is not None:
-            speeds.append(math.hypot(self.nozzle.speed, self.toolpath.speed))
+        if self.track is not None:
+            speeds.append(self.feeding_speed)
             height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
         for body in self.bodies:
             speeds.append(self._top_speed(body))
@@ -246,6 +246,13 @@ class Scenario(Model):
             sizes += [self.nozzle.diameter / 2] if self.nozzle is not None else []
             speeds.append(expansion.speed(max(sizes)))
         return max(*speeds, math.sqrt(g * height))
+
+    @property
+    def feeding_speed(self) -> float:
+        """With which matter leaves the nozzle, seen from the floor [m/s]; 0 without one."""
+        if self.nozzle is None or self.toolpath is None:
+            return 0.0
+        return math.hypot(self.nozzle.speed, self.toolpath.speed)
 
     @property
     def emits(self) -> bool:
@@ -268,8 +275,7 @@ class Scenario(Model):
     @property
     def liquid_sound_speed(self) -> float:
         """Artificial sound speed of a liquid [m/s]: `sound_speed_ratio` times the reference speed (Monaghan 1994), or
-        times sqrt(feeding pressure / density) where that is more: the larger of the scales of Morris et al. 1997, eq.
-        for c in section 2.3."""
+        times sqrt(feeding pressure / density) where that is more: the larger of the scales of Morris et al. 1997."""
         fed = math.sqrt(self.feeding_pressure / self.material.density)
         return self.sound_speed_ratio * max(self.reference_speed, fed)
 
@@ -278,10 +284,7 @@ class Scenario(Model):
         """eta U / D [Pa], of matter that a nozzle of diameter D feeds at U: the scale of the viscous stress that pushes
         and pulls it. A liquid that resists compression with less changes its density by as much, one that carries
         less tension is torn apart by its own viscosity. (Motion that nobody feeds runs out of energy before.)"""
-        if self.nozzle is None:
-            return 0.0
-        speed = math.hypot(self.nozzle.speed, 0.0 if self.toolpath is None else self.toolpath.speed)
-        return self.material.viscosity * speed / self.nozzle.diameter
+        return 0.0 if self.nozzle is None else self.material.viscosity * self.feeding_speed / self.nozzle.diameter
 
     @property
     def viscous_tension(self) -> float:

@@ -19,7 +19,7 @@ A rough wall's friction depends on what presses: B is not linear there, and no s
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import warp as wp
 
@@ -27,6 +27,7 @@ from fluidbench.native.scene import Force
 
 from ..conjugate import Iterations
 from . import implicit_warp as kernels
+from .ranks import PARTS, Ranks
 
 if TYPE_CHECKING:
     from .solver import SolverMPM
@@ -35,26 +36,26 @@ if TYPE_CHECKING:
 class GridViscosity:
     """What solves for the velocities of the nodes under viscosity; one a solver, everything allocated at once."""
 
-    OWN = ("residual", "answer", "impulse", "search", "image", "partial")
+    OWN: ClassVar[tuple[str, ...]] = ("residual", "answer", "impulse", "search", "image", "partial")
 
     def __init__(self, solver: SolverMPM, tolerance: float) -> None:
         """`tolerance` is of the residual over v* [-]."""
-        self.solver, self.kernels = solver, self.kernels_of(solver.backend.name, solver)
+        self.solver, self.kernels = solver, self.kernels_of(solver)
         scene, slots = solver.scene, len(solver.block_of)
         self.worlds = len(scene.scenarios)
         with wp.ScopedDevice(scene.device):
             nodes = [wp.zeros(slots * 64, dtype=wp.vec4) for _ in range(5)]
             self.residual, self.answer, self.impulse, self.search, self.image = nodes
-            self.partial = wp.zeros(slots * int(kernels.PARTS), dtype=wp.vec2)
+            self.partial = wp.zeros(slots * int(PARTS), dtype=wp.vec2)
             self.no_time = wp.zeros(self.worlds, dtype=float)
             self.no_force: wp.array = wp.zeros(self.worlds, dtype=Force)
-            self.ranks = kernels.Ranks()
+            self.ranks = Ranks()
             self.ranks.number = wp.zeros(slots, dtype=int)
             self.ranks.many, self.ranks.begin = wp.zeros(self.worlds, dtype=int), wp.zeros(self.worlds + 1, dtype=int)
         self.iterations = Iterations(solver.backend, self.kernels, tolerance, self.ranks.begin, self.partial)
 
-    def kernels_of(self, backend: str, solver: SolverMPM) -> SimpleNamespace:
-        if backend == "taichi":
+    def kernels_of(self, solver: SolverMPM) -> SimpleNamespace:
+        if solver.backend.name == "taichi":
             from . import implicit_taichi
 
             return implicit_taichi.passes(alone=solver.alone)

@@ -34,8 +34,8 @@ from .grid_taichi import (
     slots_in_use,
     wrapped,
 )
-from .implicit_warp import PART, PARTS
-from .kernels_taichi import gathered_from, resistance_of, viscous, weights
+from .kernels_taichi import adder, gathered_from, resistance_of, viscous, weights
+from .ranks import PART, PARTS
 
 
 @ti.func
@@ -214,14 +214,9 @@ def close(lanes: int, active: Ints, answer: Quads, moving: Quads):
 
 @functools.cache
 def passes(alone: bool) -> SimpleNamespace:
-    """All kernels; a thread that is alone needs no atomic additions."""
+    """All kernels, for one thread or several."""
 
-    @ti.func
-    def add(target: ti.template(), at, value):
-        if ti.static(alone):
-            target[at] = target[at] + value
-        else:
-            target[at] += value
+    add = adder(alone)
 
     @ti.kernel
     def resist(

@@ -1,6 +1,7 @@
 """MLS-MPM in Taichi: the passes of kernels_warp.py with the same arguments, written anew from the same equations."""
 
 import functools
+from collections.abc import Callable
 from types import SimpleNamespace
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
@@ -177,9 +178,8 @@ def g2p(
         table[block_of[slot]] = slot + 1
 
 
-@functools.cache
-def passes(alone: bool) -> SimpleNamespace:
-    """All passes; a thread that is alone needs no atomic additions, which would take half of its time."""
+def adder(alone: bool) -> Callable:
+    """What adds to a node; a thread that is alone needs no atomic additions, which would take half of its time."""
 
     @ti.func
     def add(target: ti.template(), at, value):
@@ -187,6 +187,15 @@ def passes(alone: bool) -> SimpleNamespace:
             target[at] = target[at] + value
         else:
             target[at] += value
+
+    return add
+
+
+@functools.cache
+def passes(alone: bool) -> SimpleNamespace:
+    """All passes, for one thread or several."""
+
+    add = adder(alone)
 
     @ti.kernel
     def p2g(

@@ -20,11 +20,12 @@ from fluidbench.scenario import Scenario
 
 from .. import aging
 from ..backends import backend_of
+from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
 from ..theory import mpm_numbers, stable_dt
-from ..viscosity import Scheme, Tolerance, accuracy, carried_by, footprint_of, implicit_is_cheaper
+from ..viscosity import Scheme, Tolerance, accuracy, decided
 from . import kernels_warp as kernels
 from .by_block import ByBlock
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
@@ -72,10 +73,7 @@ class SolverMPM(Solver):
 
     @classmethod
     def decided(cls, scenario: Scenario, config: Any) -> Any:
-        if config.viscosity != "auto":
-            return config
-        implicit = not scenario.domain.rubs and implicit_is_cheaper(cls, scenario, config, WORTH)
-        return config.model_copy(update={"viscosity": "implicit" if implicit else "explicit"})
+        return decided(cls, scenario, config, math.inf if scenario.domain.rubs else WORTH)
 
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
@@ -89,7 +87,8 @@ class SolverMPM(Solver):
     @classmethod
     def memory(cls, scenario: Scenario, config: Any, particles: int) -> float:
         index = 4.0 * blocks_of(scenario.domain, config.grid_ratio * scenario.spacing)  # of every block, used or not
-        return super().memory(scenario, config, particles) + index
+        solve = 5.0 * 64.0 * 16.0 * config.blocks_per_particle * particles  # nodes of its five arrays
+        return super().memory(scenario, config, particles) + index + (solve if config.viscosity == "implicit" else 0.0)
 
     @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
@@ -328,7 +327,8 @@ class SolverMPM(Solver):
         self.order.prepare()
         self.backend.prepare(self)
         if self.viscosity is not None and self.backend.name == "warp":
-            self.scene.crew.load(self.viscosity.kernels.guess.module)
+            for name in {kernel.module.name for kernel in vars(self.viscosity.kernels).values()}:
+                self.scene.crew.load(name)
         if self.by_block is not None:
             self.by_block.prepare()
         self.started = False
@@ -341,7 +341,7 @@ class SolverMPM(Solver):
         return carried_by(self.viscosity)
 
     def solves(self) -> dict[str, float]:
-        return {} if self.viscosity is None else self.viscosity.iterations.effort()
+        return effort_of(self.viscosity)
 
     def sort_keys(self) -> Any:
         return self.order.keys()

@@ -19,11 +19,12 @@ from fluidbench.scenario import Scenario
 
 from .. import aging
 from ..backends import backend_of
+from ..conjugate import carried_by, effort_of, footprint_of
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
 from ..smoothing import cusp, spiky
-from ..viscosity import ImplicitViscosity, Tolerance, accuracy, carried_by, footprint_of
+from ..viscosity import ImplicitViscosity, Tolerance, accuracy
 from . import kernels_warp as kernels
 from .elasticity import Elasticity
 from .numbers import MOVING, PLACE, PULLING, PUSH, Numbers, face_sums, lattice_sum, response
@@ -333,7 +334,7 @@ class SolverPBD(Solver):
         return self.order.keys()
 
     def solves(self) -> dict[str, float]:
-        return {} if self.viscosity is None else self.viscosity.iterations.effort()
+        return effort_of(self.viscosity)
 
     def densities(self) -> np.ndarray:
         return present_density(self.pool, 1.0 / np.maximum(self.fill.numpy(), 1.0))

@@ -20,6 +20,7 @@ from fluidbench.scenario.material import Material
 
 from .. import aging
 from ..backends import backend_of
+from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
@@ -27,15 +28,7 @@ from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
 from ..smoothing import wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
-from ..viscosity import (
-    ImplicitViscosity,
-    Scheme,
-    Tolerance,
-    accuracy,
-    carried_by,
-    footprint_of,
-    implicit_is_cheaper,
-)
+from ..viscosity import ImplicitViscosity, Scheme, Tolerance, accuracy, decided
 from . import kernels_warp as kernels
 from .particle import Smoothing
 
@@ -125,10 +118,7 @@ class SolverSPH(Solver):
 
     @classmethod
     def decided(cls, scenario: Scenario, config: Any) -> Any:
-        if config.viscosity != "auto":
-            return config
-        cheaper = "implicit" if implicit_is_cheaper(cls, scenario, config) else "explicit"
-        return config.model_copy(update={"viscosity": cheaper})
+        return decided(cls, scenario, config)
 
     @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
@@ -368,7 +358,7 @@ class SolverSPH(Solver):
         return self.order.keys()
 
     def solves(self) -> dict[str, float]:
-        return {} if self.viscosity is None else self.viscosity.iterations.effort()
+        return effort_of(self.viscosity)
 
     def densities(self) -> np.ndarray:
         return self.pool.density.numpy()

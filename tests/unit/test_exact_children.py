@@ -205,6 +205,8 @@ def test_mpm_needs_its_particles_and_an_index_of_every_block():
     for ratio, edge in ((2.0, 6), (1.0, 8)):
         assert mpm.refuses(s, mpm.Config(grid_ratio=ratio)) is None
         assert mpm.memory(s, mpm.Config(grid_ratio=ratio), 100) == 100 * mpm.typical_bytes + 4 * edge**3
+        implicit = mpm.Config(grid_ratio=ratio, viscosity="implicit")  # half a block of 64 nodes of 5 vec4 a particle
+        assert mpm.memory(s, implicit, 100) == 100 * (mpm.typical_bytes + 0.5 * 64 * 5 * 16) + 4 * edge**3
         assert Simulation(s, mpm, config=mpm.Config(grid_ratio=ratio)).solver.table.size == edge**3
     vast = scenario(domain={"lower": [0.0] * 3, "upper": [90.0] * 3})
     assert mpm.refuses(vast, mpm.Config()) == (

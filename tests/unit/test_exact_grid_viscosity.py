@@ -268,12 +268,12 @@ def test_the_piston_yields_to_nothing_where_viscosity_is_solved_for(held, height
 
 
 def test_a_viscous_strand_holds_together_and_keeps_its_volume():
-    """Fed at a stress far beyond its weight: it neither cavitates nor is compressed (mean density 0.6 and 1.4 of its
-    own with no tension and the sound speed of gravity)."""
+    """Fed at a stress far beyond its weight: without tension it swells by a third, and by 8 % at the sound speed that
+    gravity alone would ask for."""
     scenario = bead(material={"density": 1400.0, "viscosity": 300.0}, duration=0.1)
     assert scenario.liquid_sound_speed > 2.0 * 10.0 * scenario.reference_speed
     simulation = block(scenario, tolerance=1e-4)
     while simulation.now < 0.1:
         simulation.advance_tick()
     frame = simulation.frame()
-    assert 1400.0 * len(frame["density"]) / (1400.0**2 / frame["density"]).sum() == pytest.approx(1.0, abs=0.1)
+    assert (1400.0 / frame["density"]).mean() == pytest.approx(1.0, abs=0.03)
