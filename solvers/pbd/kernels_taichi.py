@@ -124,7 +124,7 @@ def multipliers(
                 even = ti.math.clamp(2.0 - 4.0 * slope / num.face_slope, 0.0, 1.0)
                 within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
                 wave = dt[world] / num.spacing
-                compliance = num.iterations * phase.density / (phase.bulk_modulus * wave * wave)
+                compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
                 multiplier += DRAWN * even * within * ti.max(1.0 - SLACK - dense, 0.0) / (metric + compliance)
             pushes[2 * i] = places[i]
             pushes[2 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), 0.0, 0.0)

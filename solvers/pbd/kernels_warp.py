@@ -121,7 +121,7 @@ def multiplier_finish(
         lack = even * within * wp.max(1.0 - SLACK - dense, 0.0)
         # Tension of bulk modulus K: it moves by dt^2 K lack grad W / rho in a substep, however short.
         wave = data.dt[world] / num.spacing
-        compliance = num.iterations * phase.density / (phase.bulk_modulus * wave * wave)
+        compliance = num.iterations * data.mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
         multiplier += DRAWN * lack / (metric + compliance)
     store_vec4(data.pushes, 2 * i, wp.vec4(own[0], own[1], own[2], own[3]))
     heft = data.mass[i] / (own[3] * phase.density)
