@@ -1,9 +1,12 @@
 """list, show and doctor: what there is, before anything runs."""
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
 from .app import app
-from .options import ScenarioName, Settings, Spacing, load_scenario
+from .options import Out, ScenarioName, Settings, Spacing, load_scenario
 
 
 @app.command("list")
@@ -26,8 +29,17 @@ def list_() -> None:
 
 
 @app.command()
-def show(scenario: ScenarioName, set_: Settings = None, spacing: Spacing = None) -> None:
-    """The resolved scenario, its derived numbers, each method's bounds, and what a run will need."""
+def show(
+    scenario: ScenarioName,
+    set_: Settings = None,
+    spacing: Spacing = None,
+    path: Annotated[bool, typer.Option("--path", help="the nozzle's path instead: its strokes, and a picture")] = False,
+    out: Out = None,
+) -> None:
+    """The resolved scenario, its derived numbers, each method's bounds, and what a run will need.
+
+    With --path where the nozzle goes, how fast and how much it extrudes, before anything runs; path.png goes to --out.
+    """
     from rich.console import Console
 
     from ..report.table import show as print_table
@@ -35,6 +47,16 @@ def show(scenario: ScenarioName, set_: Settings = None, spacing: Spacing = None)
 
     resolved = load_scenario(scenario, set_, spacing)
     console = Console()
+    if path:
+        from ..study.route import draw, route
+
+        tables, remarks = route(resolved)
+        for table in tables:
+            print_table(console, table)
+        for line in remarks:
+            console.print(line, markup=False, highlight=False)
+        typer.echo(f"picture: {draw(resolved, out or Path('fluidbench-out') / resolved.name)}")
+        return
     text, tables = preview(resolved)
     console.print(text, markup=False, highlight=False)
     for table in tables:

@@ -8,6 +8,8 @@ from ..scenario import Scenario
 from .deposit import Deposit, Section, cut
 
 MIDDLE = (0.2, 0.8)  # share of the path over which a bead's averages are taken
+STRAIGHT = 0.9  # cosine of the turn from which a corner is one: 26 degrees
+BESIDE = 1.5  # nozzle diameters from a corner within which no section is taken
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,7 @@ class Bead:
 
     @property
     def _inner(self) -> np.ndarray:
-        share = self.station / (self.laid * self.station[-1])
-        return (share >= MIDDLE[0]) & (share <= MIDDLE[1])
+        return in_middle(self.station / (self.laid * self.station[-1]))
 
     def _mean(self, values: np.ndarray) -> float:
         return float(values[self._inner].mean())
@@ -47,27 +48,57 @@ def measure_bead(deposit: Deposit, scenario: Scenario, laid: float = 1.0) -> Bea
     """Sections every spacing along the first layer's path, of which the nozzle has come the share `laid`; None without
     a moving nozzle."""
     path, nozzle = scenario.toolpath, scenario.nozzle
-    if path is None or nozzle is None or path.speed == 0:
+    if path is None or nozzle is None or scenario.track is None or path.speed == 0:
         return None
-    corners = path.corners()
-    legs = np.diff(corners, axis=0)
-    lengths = np.linalg.norm(legs, axis=1)
-    knots = np.concatenate([[0.0], np.cumsum(lengths)])
-    count = int(np.clip(knots[-1] / deposit.spacing, 12, 160))
-    station = np.linspace(0.0, knots[-1], count)
-    leg = np.clip(np.searchsorted(knots, station, side="right") - 1, 0, len(legs) - 1)
-    points = np.stack([np.interp(station, knots, corners[:, i]) for i in range(2)], axis=1)
+    stroke = scenario.track.stroke
+    legs = np.diff(stroke.points, axis=0) / np.diff(stroke.distance)[:, None]
+    station = stations(scenario)
+    points = np.stack([np.interp(station, stroke.distance, stroke.points[:, i]) for i in range(2)], axis=1)
     height = deposit.origin[2] + (deposit.fill.shape[2] - 0.5) * deposit.spacing - scenario.domain.lower[2]
     expansion = scenario.material.expansion
     reach = 2.5 * nozzle.diameter * (1.0 if expansion is None else expansion.ratio ** (1 / 3))
     if path.kind == "ring" and path.radius is not None:
         reach = min(reach, path.radius)  # not as far as the other side
     sections = [
-        cut(deposit, p, legs[i] / lengths[i], reach, height, scenario.domain.lower[2])
-        for p, i in zip(points, leg, strict=True)
+        cut(deposit, p, legs[i], reach, height, scenario.domain.lower[2])
+        for p, i in zip(points, leg_at(scenario, station), strict=True)
     ]
     columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area"))
-    return Bead(station, *columns, middle=sections[int(laid * (count // 2))], laid=laid)
+    return Bead(station, *columns, middle=sections[int(laid * (len(station) // 2))], laid=laid)
+
+
+def stations(scenario: Scenario) -> np.ndarray:
+    """Distances along the path at which sections are taken [m]: every spacing, 12 at least and 160 at most, without
+    those where nothing is laid, and those beside a corner, which would cut the other leg as well."""
+    assert scenario.track is not None and scenario.nozzle is not None
+    stroke = scenario.track.stroke
+    length = stroke.distance[-1]
+    station = np.linspace(0.0, length, int(np.clip(length / scenario.spacing, 12, 160)))
+    station = station[stroke.fed[leg_at(scenario, station)] > 0]
+    legs = np.diff(stroke.points, axis=0) / np.diff(stroke.distance)[:, None]
+    sharp = stroke.distance[1:-1][(legs[1:] * legs[:-1]).sum(axis=1) < STRAIGHT]
+    apart = np.abs(station[:, None] - sharp).min(axis=1, initial=np.inf) >= BESIDE * scenario.nozzle.diameter
+    return station[apart] if apart.any() else station
+
+
+def leg_at(scenario: Scenario, station: np.ndarray) -> np.ndarray:
+    """The leg of the path that each station lies on."""
+    assert scenario.track is not None
+    knots = scenario.track.stroke.distance
+    return np.clip(np.searchsorted(knots, station, side="right") - 1, 0, len(knots) - 2)
+
+
+def planned_area(scenario: Scenario) -> float:
+    """Q / V [m^2], averaged over the stations of which a bead's averages are taken, once all of it was laid."""
+    assert scenario.track is not None and scenario.nozzle is not None
+    station = stations(scenario)
+    inner = station[in_middle(station / station[-1])]
+    return scenario.nozzle.rate * float(scenario.track.stroke.fed[leg_at(scenario, inner)].mean())
+
+
+def in_middle(share: np.ndarray) -> np.ndarray:
+    """Whether averages are taken there, at a share of the path."""
+    return (share >= MIDDLE[0]) & (share <= MIDDLE[1])
 
 
 def laid_share(birth_time: np.ndarray, scenario: Scenario) -> float:
@@ -76,8 +107,9 @@ def laid_share(birth_time: np.ndarray, scenario: Scenario) -> float:
     if path is None or track is None or nozzle is None or path.speed == 0 or not len(birth_time):
         return 1.0
     disc = scenario.spacing * (1.0 + path.speed / nozzle.speed)  # that the last of them may have been early
-    come = float(track.extruded(float(birth_time.max()))) * path.speed + disc
-    return min(come / path.length(), 1.0)
+    stroke = track.stroke
+    come = float(np.interp(float(birth_time.max()), stroke.time, stroke.distance)) + disc
+    return min(come / stroke.distance[-1], 1.0)
 
 
 def layer_heights(position: np.ndarray, birth_time: np.ndarray, scenario: Scenario) -> list[float]:

@@ -5,7 +5,7 @@ import numpy as np
 from ..method.frame import CARRIED, Frame
 from ..scenario import Scenario
 from ..scenario.layout import emitted
-from .bead import laid_share, layer_heights, measure_bead
+from .bead import Bead, laid_share, layer_heights, measure_bead
 from .deposit import Deposit
 from .slump import measure_slump
 from .tower import family_spread, is_tower, measure_tower, progress, standing
@@ -46,16 +46,31 @@ def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     return row | progress(frame, scenario)
 
 
+def bead_of(frame: Frame, deposit: Deposit, scenario: Scenario) -> Bead | None:
+    """Sections along what was laid of the path: of all that lies there, or, where layers are not laid over one another,
+    of the measured stroke's own matter."""
+    path, track = scenario.toolpath, scenario.track
+    free = frame["held"] != CARRIED
+    births = frame["birth_time"][free]
+    if path is None or track is None:
+        return None
+    if not path.repeats:
+        own = (births >= track.stroke.time[0]) & (births <= track.stroke.time[-1])
+        births = births[own]
+        deposit = Deposit.of(
+            frame["position"][free][own], frame["volume"][free][own], scenario.domain, scenario.spacing
+        )
+    return measure_bead(deposit, scenario, laid_share(births, scenario))
+
+
 def beads(frame: Frame, deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     """Section of the bead and rise of the layers along what was laid of the path."""
-    if scenario.toolpath is None:
-        return {}
-    free = frame["held"] != CARRIED
-    bead = measure_bead(deposit, scenario, laid_share(frame["birth_time"][free], scenario))
-    if bead is None:
+    bead, path, free = bead_of(frame, deposit, scenario), scenario.toolpath, frame["held"] != CARRIED
+    if bead is None or path is None:
         return {}
     rises = layer_heights(frame["position"][free], frame["birth_time"][free], scenario)
-    return bead.summary(scenario.toolpath.layers) | {f"layer_{i}_height_m": rise for i, rise in enumerate(rises, 2)}
+    summary = bead.summary(path.layers if path.repeats else 1)
+    return summary | {f"layer_{i}_height_m": rise for i, rise in enumerate(rises, 2)}
 
 
 def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:

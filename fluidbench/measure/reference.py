@@ -11,6 +11,7 @@ import numpy as np
 from ..scenario import Scenario
 from ..scenario.library import reference_table
 from ..scenario.stream import Stream
+from .bead import planned_area
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +86,7 @@ def _area(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> 
     t = float(series["time_s"].iloc[-1])
     if t < track.end * (1.0 - 1e-6):
         raise DoesNotApply(f"bead area against Q / V: the path takes {track.end:.3g} s, the run ends at {t:.3g} s")
-    area, source = nozzle.rate / path.speed, "Q / V"
+    area, source = planned_area(scenario), "Q / V"
     if (expansion := scenario.material.expansion) is not None:
         laid = float(track.extruding[-1]) * (np.arange(200) + 0.5) / 200
         area *= float(np.mean([expansion.volume_ratio(t - release) for release in track.release_time(laid)]))

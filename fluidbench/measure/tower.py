@@ -45,7 +45,8 @@ class Criterion:
 
 
 def is_tower(scenario: Scenario) -> bool:
-    return scenario.toolpath is not None and scenario.toolpath.layers > 1 and scenario.toolpath.speed > 0
+    path = scenario.toolpath
+    return path is not None and path.layers > 1 and path.speed > 0 and path.repeats
 
 
 def layer_of(frame: Frame, scenario: Scenario) -> np.ndarray:
@@ -185,14 +186,16 @@ def _spread(values: np.ndarray, weights: np.ndarray) -> float:
 
 def _continuity(along: np.ndarray, across: np.ndarray, mass: np.ndarray, scenario: Scenario) -> float:
     """Share of the sectors that hold, near the path, at least THIN of the mass that the nozzle lays per length."""
-    path, nozzle, expansion = scenario.toolpath, scenario.nozzle, scenario.material.expansion
-    assert path is not None and nozzle is not None
+    track, nozzle, expansion = scenario.track, scenario.nozzle, scenario.material.expansion
+    assert track is not None and nozzle is not None
     wide = BESIDE * nozzle.diameter * (1.0 if expansion is None else expansion.ratio ** (1 / 3))
     near = np.abs(across) <= wide
     edges = _sector_edges(scenario)
     held, _ = np.histogram(along[near], edges, weights=mass[near])
-    laid = scenario.material.density * nozzle.rate / path.speed * path.length() * np.diff(edges)
-    return float((held >= THIN * laid).mean())
+    stroke = track.stroke
+    fed = np.diff(np.interp(edges, stroke.distance / stroke.distance[-1], stroke.extruding))
+    laid = scenario.material.density * nozzle.rate * fed
+    return float((held >= THIN * laid)[laid > 0].mean())
 
 
 def progress(frame: Frame, scenario: Scenario) -> dict[str, float]:

@@ -62,14 +62,6 @@ class Force:
     gradient: wp.mat33
 
 
-@wp.struct
-class Outlet:
-    """How what is carried moves until it is let go: downwards, in discs."""
-
-    speed: float  # against the outlet [m/s]
-    spacing: float  # from disc to disc [m]
-
-
 @wp.func
 def force_at(force: Force, x: wp.vec3):
     """Force per unit mass [m/s^2] at a point."""
@@ -115,9 +107,6 @@ class Scene:
         self.top_speed = top_speed(self.scenario, self.top_wave_speed)
         self.box = box_of(self.scenario)
         self.box.top_speed = self.top_speed
-        self.outlet = Outlet()
-        self.outlet.speed = 1.0 if self.scenario.nozzle is None else self.scenario.nozzle.speed
-        self.outlet.spacing = self.spacing
         self._dt = math.nan
         with wp.ScopedDevice(self.device):
             self.dt = wp.zeros(self.worlds, dtype=float)

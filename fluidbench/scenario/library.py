@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from ..errors import UserError, quoted, suggestion
 from .numerics import check_numerics
 from .scenario import Scenario
+from .units import in_si
 
 DEEPEST = 32  # files that extend one another
 LARGEST = 2**20  # bytes of a scenario file
@@ -84,7 +85,10 @@ def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = N
 
 def _coarser(table: dict[str, Any]) -> dict[str, Any]:
     """A third more spacing, where there is one that is a number."""
-    spacing = table.get("spacing")
+    try:
+        spacing = in_si(table.get("spacing"), "m")
+    except ValueError:  # said with its place when the table is validated
+        return table
     return table | {"spacing": 4 / 3 * spacing} if isinstance(spacing, int | float) else table
 
 
@@ -149,6 +153,9 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
         raise UserError(f"{path}: not valid TOML: {_short(error)}") from None
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
+    own = table.get("toolpath")
+    if isinstance(own, dict) and isinstance(own.get("file"), str):  # beside the file that names it
+        own["file"] = str(path.parent / own["file"])
     base = table.pop("extends", None)
     if base is None:
         return table

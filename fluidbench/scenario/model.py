@@ -4,7 +4,9 @@ Kernels compute in single precision. No number may be so large that its square i
 no float32 itself; quantities that are positive by nature are divided by, and their squares must not vanish either.
 """
 
+import functools
 import math
+import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
@@ -13,6 +15,7 @@ from annotated_types import Gt
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from ..errors import suggestion
+from .units import in_si
 
 LARGEST, SMALLEST = 1e18, 1e-18  # whose squares are float32s
 LEAST = 1.2e-38  # the smallest float32 of full precision
@@ -45,6 +48,25 @@ class Model(BaseModel):
         if annotation is not bool and any(isinstance(v, bool) for v in _leaves(value)):
             raise ValueError("true and false are not values of this key")
         return value
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
+        """Texts such as "20 mm" are numbers, too."""
+        wanted = cls.unit_of(info.field_name or "")
+        if wanted is not None and "flow_index" in info.data:
+            wanted = wanted.replace("^n", f"^{info.data['flow_index']:g}")
+        return value if wanted is None else _converted(value, wanted)
+
+    @classmethod
+    @functools.cache
+    def unit_of(cls, key: str) -> str | None:
+        """The SI unit that a key is described in, empty for a ratio; None where it holds no numbers of one kind."""
+        field = cls.model_fields[key]
+        units = re.findall(r"\[([^\]]*)\]", field.description or "")
+        if not units or any(word in str(field.annotation) for word in ("str", "Packed")):
+            return None
+        return "" if units[-1] == "-" else units[-1]
 
     @field_validator("*", mode="after")
     @classmethod
@@ -95,6 +117,13 @@ def _leaves(value: Any) -> list[Any]:
     if isinstance(value, list | tuple):
         return [leaf for part in value for leaf in _leaves(part)]
     return [value]
+
+
+def _converted(value: Any, wanted: str) -> Any:
+    """A text with a unit, or texts in lists, as numbers in SI."""
+    if isinstance(value, list | tuple):
+        return [_converted(part, wanted) for part in value]
+    return in_si(value, wanted)
 
 
 def check_number(value: float) -> None:

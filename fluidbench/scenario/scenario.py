@@ -19,6 +19,7 @@ from .extent import check_size, check_time
 from .material import Material
 from .model import Matrix, Model, Positive, Vector
 from .nozzle import Nozzle
+from .slicer import completed
 from .toolpath import Toolpath, Track
 
 if TYPE_CHECKING:
@@ -63,6 +64,11 @@ class Scenario(Model):
         None, description="a published answer to compare with (scenarios/reference)"
     )
     numerics: dict[str, dict[str, Any]] = Field({}, description="per method: overrides of its own numerical settings")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _reads_gcode(cls, table: Any) -> Any:
+        return completed(table)
 
     @field_validator("name")
     @classmethod
@@ -235,7 +241,7 @@ class Scenario(Model):
         g = float(np.linalg.norm(self.acceleration))
         speeds, height = [1e-3], 0.0
         if self.track is not None:
-            speeds.append(self.feeding_speed)
+            speeds += [self.feeding_speed, float(self.track.speed_in.max())]
             height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
         for body in self.bodies:
             speeds.append(self._top_speed(body))
@@ -250,9 +256,10 @@ class Scenario(Model):
     @property
     def feeding_speed(self) -> float:
         """With which matter leaves the nozzle, seen from the floor [m/s]; 0 without one."""
-        if self.nozzle is None or self.toolpath is None:
+        if self.nozzle is None or self.track is None:
             return 0.0
-        return math.hypot(self.nozzle.speed, self.toolpath.speed)
+        fed = self.track.flow_in > 0
+        return float(np.hypot(self.nozzle.speed * self.track.flow_in, self.track.speed_in)[fed].max())
 
     @property
     def emits(self) -> bool:

@@ -45,8 +45,8 @@ class Stream:
 
     @cached_property
     def extruding(self) -> np.ndarray:
-        """Time spent extruding when each disc is released, shape (layers,) [s]; half a disc early, so the emitted mass
-        is within half a disc of rho Q t at any time."""
+        """Time that the nozzle's flow takes for each disc and all before it, shape (layers,) [s]; half a disc early, so
+        the emitted mass is within half a disc of what is fed at any time."""
         assert self.scenario.nozzle is not None and self.scenario.track is not None
         period = self.scenario.spacing / self.scenario.nozzle.speed
         end = min(self.scenario.track.end, self.scenario.duration)
@@ -63,7 +63,9 @@ class Stream:
     def velocity(self) -> np.ndarray:
         """Velocity of each disc at its release, shape (layers, 3) [m/s]: the nozzle's plus the exit speed downwards."""
         assert self.scenario.nozzle is not None and self.scenario.track is not None
-        return self.scenario.track.velocity(self.release_time - 1e-12) - [0.0, 0.0, self.scenario.nozzle.speed]
+        track, time = self.scenario.track, self.release_time - 1e-12
+        down = self.scenario.nozzle.speed * track.flow(time)
+        return track.velocity(time) - down[:, None] * [0.0, 0.0, 1.0]
 
     @property
     def volume(self) -> float:

@@ -7,10 +7,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from ..measure.bead import laid_share, measure_bead
-from ..measure.ledger import deposit_of
+from ..measure.ledger import bead_of, deposit_of
 from ..measure.reference import DoesNotApply, martin_moyce
-from ..method.frame import CARRIED
 from ..report.plot import Plot, Trace, colour
 from ..runs.record import Run
 from ..scenario import Scenario
@@ -35,8 +33,7 @@ def _bead_plots(done: Sequence[Run], scenario: Scenario) -> list[Plot]:
     height = Plot("height", "bead height along the path", "distance along the path [mm]", "height [mm]")
     for result in done:
         frame = result.frame()
-        laid = laid_share(frame["birth_time"][frame["held"] != CARRIED], scenario)
-        bead = measure_bead(deposit_of(frame, scenario), scenario, laid)
+        bead = bead_of(frame, deposit_of(frame, scenario), scenario)
         if bead is None:
             continue
         for i, outline in enumerate(outlines(bead.middle.across, bead.middle.up, bead.middle.fill)):

@@ -4,6 +4,7 @@ import json
 import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from ..registry import get_method
 from ..report.table import Table, number
@@ -14,9 +15,18 @@ from .workplace import methods_of
 
 def preview(scenario: Scenario) -> tuple[str, list[Table]]:
     """The scenario as text, and tables of derived numbers, bounds and needs."""
-    text = json.dumps(scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True), indent=2)
+    text = json.dumps(_shortened(scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)), indent=2)
     estimates = [estimate(scenario, get_method(name)) for name in methods_of(None)]
     return text, [derived(scenario), *_bounds(estimates), _needs(estimates)]
+
+
+def _shortened(value: Any) -> Any:
+    """A dumped scenario with the size of an array for its numbers."""
+    if isinstance(value, dict):
+        packed = set(value) == {"float64", "shape"}
+        size = f"an array of {' x '.join(map(str, value['shape']))}" if packed else ""
+        return size or {key: _shortened(inner) for key, inner in value.items()}
+    return [_shortened(inner) for inner in value] if isinstance(value, list) else value
 
 
 def derived(scenario: Scenario) -> Table:

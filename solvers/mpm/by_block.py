@@ -119,7 +119,7 @@ class ByBlock:
                 pool.phase,
                 pool.held,
                 shifting,
-                scene.outlet,
+                scene.spacing,
                 hours.row,
                 hours.exit,
             ],

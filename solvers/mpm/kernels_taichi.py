@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import Outlet
 
 from ..flow_taichi import pressure, shear_rate, strained
 from ..smoothing import quadratic_spline
@@ -23,7 +22,6 @@ from ..taichi_bridge import (
     ivec3,
     mat3,
     phase_at,
-    struct_of,
     symmetric,
     taichi_func,
     ti,
@@ -59,7 +57,6 @@ from .grid_taichi import (
 from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
 
 spline = taichi_func(quadratic_spline)
-OutletT = struct_of(Outlet)
 
 
 @ti.func
@@ -128,7 +125,7 @@ def g2p(
     phase_of: Ints,
     held: Ints,
     shifting: float,
-    outlet: OutletT,
+    pitch: float,
     row: Ints,
     exit: Vectors,
     position: Vectors,
@@ -158,10 +155,10 @@ def g2p(
                 if not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
                     amount = ti.min(shifting * h * shear_rate(moment), STEEPEST)
                     x -= (4.0 * amount / phase.density) * lean * grid.dx
-            elif held[p] == CARRIED:
-                ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] + 0.5 * outlet.spacing - x[2]) - v[2]
-                left = ti.math.clamp(1.0 - ahead / outlet.speed, 1.0 / PACKED, PACKED)
-                volume_ratio[p] += ti.min(outlet.speed * h / outlet.spacing, 1.0) * (left - volume_ratio[p])
+            elif held[p] == CARRIED and v[2] < 0.0:
+                ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] + 0.5 * pitch - x[2]) - v[2]
+                left = ti.math.clamp(1.0 + ahead / v[2], 1.0 / PACKED, PACKED)
+                volume_ratio[p] += ti.min(-v[2] * h / pitch, 1.0) * (left - volume_ratio[p])
             free = x + h * v
             if too_fast(v, grid.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.native.crew import BLOCK, index_of, raise_fault
-from fluidbench.native.scene import Force, Outlet, Phase, force_at
+from fluidbench.native.scene import Force, Phase, force_at
 from fluidbench.native.vector_access import in_company, load_vec4
 
 from .grid import (
@@ -253,7 +253,7 @@ def g2p(
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
     shifting: float,
-    outlet: Outlet,
+    pitch: float,
     row: wp.array(dtype=int),
     exit: wp.array(dtype=wp.vec3),
     # outputs
@@ -278,7 +278,7 @@ def g2p(
         sums = sums_of(moving, f, wx, wy, wz, bx, by, bz, lx, ly, lz, s0, s1, s2, s3, s4, s5, s6, s7)
         c = affine_of(grid, sums)
         affine[p] = c
-        v = taken(p, x, sums, c, dt[world], outlet, row, exit, held, velocity, volume_ratio)
+        v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
         x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
         after = moved(grid, x, v, dt[world], p, position, velocity, fault)
         if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:

@@ -5,7 +5,7 @@ import warp as wp
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.crew import raise_fault
 from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import STICK, Outlet, Phase, is_solid, too_fast
+from fluidbench.native.scene import STICK, Phase, is_solid, too_fast
 
 from ..bind import warp_func
 from ..flow import pressure, shear_rate, strained
@@ -194,7 +194,7 @@ def taken(
     sums: wp.mat44,
     gradient: wp.mat33,
     dt: float,
-    outlet: Outlet,
+    pitch: float,
     row: wp.array(dtype=int),
     exit: wp.array(dtype=wp.vec3),
     held: wp.array(dtype=int),
@@ -213,12 +213,12 @@ def taken(
     if held[p] == FREE:
         v = gathered
         velocity[p] = v
-    elif held[p] == CARRIED:
+    elif held[p] == CARRIED and v[2] < 0.0:
         # the grid's speed beyond its own, half a spacing above the outlet: from there on its own gradient tells
-        ahead = gathered[2] + gradient[2, 2] * (exit[row[0]][2] + 0.5 * outlet.spacing - x[2]) - v[2]
+        ahead = gathered[2] + gradient[2, 2] * (exit[row[0]][2] + 0.5 * pitch - x[2]) - v[2]
         j = volume_ratio[p]
-        left = wp.clamp(1.0 - ahead / outlet.speed, 1.0 / PACKED, PACKED)
-        volume_ratio[p] = j + wp.min(outlet.speed * dt / outlet.spacing, 1.0) * (left - j)
+        left = wp.clamp(1.0 + ahead / v[2], 1.0 / PACKED, PACKED)
+        volume_ratio[p] = j + wp.min(-v[2] * dt / pitch, 1.0) * (left - j)
     return v
 
 

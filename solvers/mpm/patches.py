@@ -8,7 +8,7 @@ in the same way, once it holds the velocities.
 import warp as wp
 
 from fluidbench.native.crew import index_of
-from fluidbench.native.scene import Outlet, Phase
+from fluidbench.native.scene import Phase
 
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
@@ -228,7 +228,7 @@ def gather(
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
     shifting: float,
-    outlet: Outlet,
+    pitch: float,
     row: wp.array(dtype=int),
     exit: wp.array(dtype=wp.vec3),
     # outputs
@@ -254,7 +254,7 @@ def gather(
             sums = taken_from_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, f)
             c = affine_of(grid, sums)
             affine[p] = c
-            v = taken(p, x, sums, c, dt[world], outlet, row, exit, held, velocity, volume_ratio)
+            v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
             x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
             after = moved(grid, x, v, dt[world], p, position, velocity, fault)
             if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:

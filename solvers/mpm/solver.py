@@ -305,7 +305,7 @@ class SolverMPM(Solver):
                 pool.phase,
                 pool.held,
                 self.shifting,
-                scene.outlet,
+                scene.spacing,
                 hours.row,
                 hours.exit,
             ],

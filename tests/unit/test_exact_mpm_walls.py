@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
-from fluidbench.native.scene import Outlet, Phase, Scene
+from fluidbench.native.scene import Phase, Scene
 from solvers.mpm import grid as mpm_grid
 from solvers.mpm import particle as mpm
 from solvers.mpm import walls as mpm_walls
@@ -162,7 +162,7 @@ def ask_taken(
     sums: wp.mat44,
     c: wp.mat33,
     dt: float,
-    outlet: Outlet,
+    pitch: float,
     row: wp.array(dtype=int),
     exit: wp.array(dtype=wp.vec3),
     held: wp.array(dtype=int),
@@ -170,14 +170,13 @@ def ask_taken(
     volume_ratio: wp.array(dtype=float),
     out: wp.array(dtype=wp.vec3),
 ):
-    out[0] = mpm.taken(0, wp.vec3(0.0, 0.0, 0.1), sums, c, dt, outlet, row, exit, held, velocity, volume_ratio)
+    out[0] = mpm.taken(0, wp.vec3(0.0, 0.0, 0.1), sums, c, dt, pitch, row, exit, held, velocity, volume_ratio)
 
 
 @pytest.mark.parametrize("below", [0.05, 0.1, 0.2, 0.5])
 def test_matter_leaves_the_nozzle_as_dense_as_the_grid_below_crowds_it(below):
     """Carried at U = 0.1 m/s towards a grid that moves at `below` half a spacing above the exit: J goes to u / U."""
-    outlet = Outlet()
-    outlet.spacing, outlet.speed = 0.01, 0.1
+    pitch = 0.01
     exit_height, slope, dt = 0.098, 2.0, 0.05
     at_particle = -below - slope * (exit_height + 0.005 - 0.1)  # the linear field that is -below there
     sums, c = np.zeros((4, 4), np.float32), np.zeros((3, 3), np.float32)
@@ -191,7 +190,7 @@ def test_matter_leaves_the_nozzle_as_dense_as_the_grid_below_crowds_it(below):
         velocity = wp.array([[0.0, 0.0, -0.1]], dtype=wp.vec3, device="cpu")
         kept = wp.array([1.0], dtype=float, device="cpu")
         row, exits = wp.array([1], **one), wp.array([[9.0] * 3, [0.0, 0.0, exit_height]], dtype=wp.vec3, device="cpu")
-        given = [wp.mat44(*sums.ravel()), wp.mat33(*c.ravel()), dt, outlet, row, exits]
+        given = [wp.mat44(*sums.ravel()), wp.mat33(*c.ravel()), dt, pitch, row, exits]
         got = asked(ask_taken, wp.vec3, *given, wp.array([int(held)], **one), velocity, kept)
         assert list(got) == pytest.approx([0.0, 0.0, moves], rel=1e-5)
         assert velocity.numpy()[0, 2] == pytest.approx(moves, rel=1e-5)
