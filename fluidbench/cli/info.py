@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from .app import app
-from .options import Out, ScenarioName, Settings, Spacing, load_scenario
+from .options import ScenarioName, Settings, Spacing, load_scenario
 
 
 @app.command("list")
@@ -34,11 +34,11 @@ def show(
     set_: Settings = None,
     spacing: Spacing = None,
     path: Annotated[bool, typer.Option("--path", help="the nozzle's path instead: its strokes, and a picture")] = False,
-    out: Out = None,
 ) -> None:
     """The resolved scenario, its derived numbers, each method's bounds, and what a run will need.
 
-    With --path where the nozzle goes, how fast and how much it extrudes, before anything runs; path.png goes to --out.
+    With --path where the nozzle goes, how fast and how much it extrudes, before anything runs; path.png goes to
+    fluidbench-out and the scenario.
     """
     from rich.console import Console
 
@@ -55,7 +55,7 @@ def show(
             print_table(console, table)
         for line in remarks:
             console.print(line, markup=False, highlight=False)
-        typer.echo(f"picture: {draw(resolved, out or Path('fluidbench-out') / resolved.name)}")
+        typer.echo(f"picture: {draw(resolved, Path('fluidbench-out') / resolved.name)}")
         return
     text, tables = preview(resolved)
     console.print(text, markup=False, highlight=False)

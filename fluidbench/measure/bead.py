@@ -9,7 +9,7 @@ from .deposit import Deposit, Section, cut
 
 MIDDLE = (0.2, 0.8)  # share of the path over which a bead's averages are taken
 STRAIGHT = 0.9  # cosine of the turn from which a corner is one: 26 degrees
-BESIDE = 1.5  # nozzle diameters from a corner within which no section is taken
+BESIDE = 1.0  # nozzle diameters from a corner within which no section is taken
 
 
 @dataclass(frozen=True)

@@ -56,9 +56,11 @@ def test_sections_stand_square_to_the_leg_they_lie_on():
     path = {"kind": "polyline", "points": [[0.0, 0.0], [0.03, 0.0], [0.03, 0.02]], "speed": 0.1}
     made = measure_bead(block(y=(16, 40)), paste(toolpath=path))
     first = made.station < 0.03
-    assert len(made.station) == 25 and (~first).sum() == 10
-    assert made.width[first] == pytest.approx(np.full(15, 12.0 * D + 0.014), abs=D)  # from -0.008 to the reach of 0.03
-    assert made.width[~first] == pytest.approx(np.full(10, 0.06), abs=D / 3)
+    # 25 are a spacing apart; those within a nozzle's diameter, 0.012, of the corner would cut both legs
+    assert len(made.station) == 13 and (~first).sum() == 4
+    assert made.station[first].max() <= 0.018 and made.station[~first].min() >= 0.042
+    assert made.width[first] == pytest.approx(np.full(9, 12.0 * D + 0.014), abs=D)  # from -0.008 to the reach of 0.03
+    assert made.width[~first] == pytest.approx(np.full(4, 0.06), abs=D / 3)
 
 
 @pytest.mark.parametrize(
