@@ -63,6 +63,14 @@ Pictures = Annotated[
     ),
 ]
 Frames = Annotated[bool, typer.Option("--frames", help="keep a snapshot of every output, not only of the last")]
+MeasuredFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--measured",
+        help="what was measured on a real print: CSV with quantity, value and, where known, uncertainty, layer, place",
+        show_default=False,
+    ),
+]
 Shorter = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter and coarser version")]
 Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
 

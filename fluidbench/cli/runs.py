@@ -1,6 +1,7 @@
 """compare, run and validate: scenarios and cases through the methods."""
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -9,6 +10,7 @@ from .app import app, finish
 from .options import (
     Checkpoint,
     Frames,
+    MeasuredFile,
     Pictures,
     ScenarioName,
     Settings,
@@ -43,6 +45,7 @@ def compare(
     quick: Shorter = False,
     render_every: Pictures = None,
     checkpoint_every: Checkpoint = CHECKPOINTS,
+    measured: MeasuredFile = None,
     *,
     options: Any,
 ) -> None:
@@ -55,7 +58,7 @@ def compare(
 
     resolved = load_scenario(scenario, set_, spacing, quick)
     backends, repeats = names_in(options.pop("backend"), "--backend", "backend"), repeats_of(repeats)
-    watched = _watched(frames, render_every, checkpoint_every)
+    watched = _watched(frames, render_every, checkpoint_every, measured)
     _warn(resolved)
     more = placed(options, resolved.name)
     finish(study(resolved, methods_in(solvers), repeats=repeats, backends=backends, **watched, **more), width=None)
@@ -72,6 +75,7 @@ def run(
     quick: Shorter = False,
     render_every: Pictures = None,
     checkpoint_every: Checkpoint = CHECKPOINTS,
+    measured: MeasuredFile = None,
     *,
     options: Any,
 ) -> None:
@@ -80,16 +84,19 @@ def run(
     from ..study.compare import compare as study
 
     resolved = load_scenario(scenario, set_, spacing, quick)
-    watched = _watched(frames, render_every, checkpoint_every)
+    watched = _watched(frames, render_every, checkpoint_every, measured)
     _warn(resolved)
     language = "" if options["backend"] == DEFAULT_BACKEND else f"-{options['backend']}"
     more = placed(options, resolved.name)
     finish(study(resolved, [solver], verb=f"run-{solver}{language}", **watched, **more), width=None)
 
 
-def _watched(frames: bool, render_every: float | None, checkpoint_every: float) -> dict[str, Any]:
-    """How runs are watched; raises UserError for times that are none."""
+def _watched(
+    frames: bool, render_every: float | None, checkpoint_every: float, measured: Path | None
+) -> dict[str, Any]:
+    """How runs are watched, and what they are beside; raises UserError for times that are none."""
     return {
+        "measured": measured or (),
         "frames": frames,
         "render_every": None if render_every is None else positive(render_every, "--render-every"),
         "checkpoint_every": seconds(checkpoint_every, "--checkpoint-every", zero=True),

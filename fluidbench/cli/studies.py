@@ -6,6 +6,7 @@ import typer
 
 from .app import app, finish
 from .options import (
+    MeasuredFile,
     Quick,
     ScenarioName,
     Settings,
@@ -109,6 +110,7 @@ def select(
     solvers: Solvers = None,
     set_: Settings = None,
     spacing: Spacing = None,
+    measured: MeasuredFile = None,
     *,
     options: Any,
 ) -> None:
@@ -121,7 +123,16 @@ def select(
     resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
     longest, pace = budget_of(budget)
     more = placed(options, f"select-{resolved.name}")
-    chosen = study(resolved, methods_in(solvers), tolerance=share, budget=longest, pace=pace, called=scenario, **more)
+    chosen = study(
+        resolved,
+        methods_in(solvers),
+        tolerance=share,
+        budget=longest,
+        pace=pace,
+        called=scenario,
+        measured=measured or (),
+        **more,
+    )
     finish(chosen)
 
 

@@ -68,9 +68,10 @@ def beads(frame: Frame, deposit: Deposit, scenario: Scenario) -> dict[str, float
     bead, path, free = bead_of(frame, deposit, scenario), scenario.toolpath, frame["held"] != CARRIED
     if bead is None or path is None:
         return {}
+    if not path.repeats:
+        return bead.summary(1)
     rises = layer_heights(frame["position"][free], frame["birth_time"][free], scenario)
-    summary = bead.summary(path.layers if path.repeats else 1)
-    return summary | {f"layer_{i}_height_m": rise for i, rise in enumerate(rises, 2)}
+    return bead.summary(path.layers) | {f"layer_{i}_height_m": rise for i, rise in enumerate(rises, 2)}
 
 
 def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:

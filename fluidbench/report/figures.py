@@ -19,14 +19,16 @@ def draw(plot: Plot) -> bytes:
     figure = figure_of(7.0, 4.0)
     axes = figure.subplots()
     for trace in plot.traces:
+        places = [x.replace("<br>", "\n") if isinstance(x, str) else x for x in trace.x]  # a page breaks lines so
         if trace.style == "bar":
-            axes.bar(trace.x, trace.y, color=trace.colour)
+            axes.bar(places, trace.y, color=trace.colour)
         elif trace.style == "points":
-            axes.plot(trace.x, trace.y, "o", mfc="none", color=trace.colour, label=trace.label)
+            marks = {"fmt": "o", "mfc": "none", "capsize": 4, "color": trace.colour, "label": trace.label}
+            axes.errorbar(places, trace.y, trace.spread, **marks)
         else:
             marker = "o" if trace.style == "line+points" else ""
             line = {"dashed": "--", "dotted": ":"}.get(trace.style, "-")
-            axes.plot(trace.x, trace.y, line, marker=marker, color=trace.colour, label=trace.label or None, lw=1.6)
+            axes.plot(places, trace.y, line, marker=marker, color=trace.colour, label=trace.label or None, lw=1.6)
     axes.set(title=plot.title, xlabel=plot.x, ylabel=plot.y)
     if plot.log:
         axes.set(xscale="log", yscale="log")

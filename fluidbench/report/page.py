@@ -82,6 +82,7 @@ def interactive(plot: Plot) -> Any:
                 line={"color": trace.colour, "dash": dash},
                 legendgroup=trace.colour,
                 showlegend=bool(trace.label),
+                error_y=None if trace.spread is None else {"array": trace.spread},
             )
     figure.update_layout(
         title=plot.title,

@@ -30,13 +30,14 @@ def colour(label: str) -> str:
 
 @dataclass(frozen=True)
 class Trace:
-    """One line (or points, or bars) of a plot."""
+    """One line (or points, or bars) of a plot; `spread` is how uncertain each of its points is."""
 
     label: str
     x: list[Any]
     y: list[float]
     style: str = "line"
     colour: str = "#000000"
+    spread: list[float] | None = None
 
 
 @dataclass(frozen=True)

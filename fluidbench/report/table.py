@@ -61,6 +61,14 @@ def spread(values: Sequence[float]) -> str:
 UNITS = {"m": "m", "m2": "m²", "kg": "kg", "J": "J", "s": "s", "MiB": "MiB"}
 
 
+def readable(key: str, values: Sequence[float]) -> tuple[str, float]:
+    """(label, factor) under which the values of a measure read best: lengths below a metre in millimetres."""
+    unit = key.rpartition("_")[2]
+    if unit in ("m", "m2") and values and max(map(abs, values)) < 1.0:
+        return label(key).replace("[m", "[mm"), 1e3 if unit == "m" else 1e6
+    return label(key), 1.0
+
+
 def label(key: str) -> str:
     """'bead_width_m' -> 'bead width [m]'."""
     words = key.split("_")

@@ -49,9 +49,9 @@ class Job(Work):
         return get_method(self.method).interpreter()
 
     def inputs(self) -> dict[str, Any]:
-        """What a run is; how long it may take, and whether it is filmed, is not."""
+        """What a run is; how long it may take, whether it is filmed, and what it will be compared with, is not."""
         return {
-            "scenario": self.scenario,
+            "scenario": {key: value for key, value in self.scenario.items() if key != "measured"},
             "method": self.method,
             "target": asdict(self.target),
             "repeat": self.repeat,

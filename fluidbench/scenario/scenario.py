@@ -17,6 +17,7 @@ from .collider import Collider
 from .domain import Domain
 from .extent import check_size, check_time
 from .material import Material
+from .measured import Measured
 from .model import Matrix, Model, Positive, Vector
 from .nozzle import Nozzle
 from .slicer import completed
@@ -63,6 +64,7 @@ class Scenario(Model):
     reference: Literal["martin_moyce_front", "viscoplastic_slump"] | None = Field(
         None, description="a published answer to compare with (scenarios/reference)"
     )
+    measured: tuple[Measured, ...] = Field((), description="what was measured on a real print, to compare with")
     numerics: dict[str, dict[str, Any]] = Field({}, description="per method: overrides of its own numerical settings")
 
     @model_validator(mode="before")

@@ -15,10 +15,21 @@ from ..registry import get_method
 from ..runs.job import CHECKPOINTS, Job
 from ..runs.record import Run
 from ..scenario import Scenario
+from ..scenario.measured import Measured
 from ..scenario.numerics import configure
 from .compare_report import report
 from .result import Result
-from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number, targets_of, threads_alone
+from .workplace import (
+    Options,
+    Workplace,
+    as_scenario,
+    measured_of,
+    methods_of,
+    names_of,
+    require_number,
+    targets_of,
+    threads_alone,
+)
 
 WALL_LIMIT = 900.0  # s
 
@@ -38,6 +49,7 @@ def compare(
     frames: bool = False,
     render_every: float | None = None,
     checkpoint_every: float = CHECKPOINTS,
+    measured: str | Path | Sequence[Measured] = (),
     verb: str = "compare",
     **options: Unpack[Options],
 ) -> Comparison:
@@ -46,7 +58,8 @@ def compare(
     `scenario` is one, or the name of a shipped one (`quick`: its shorter version), or a TOML file. `methods`: their
     names; default all. `repeats`: runs of each, for the spread of its cost. `backends`: several languages instead of
     one. `frames` keeps a snapshot of every output, `render_every` [simulated s] draws pictures beside the run,
-    `checkpoint_every` [wall s] is what a killed run loses at most (0: everything). `verb` names what is written.
+    `checkpoint_every` [wall s] is what a killed run loses at most (0: everything). `measured`: a table of what was
+    measured on a real print (CSV), beside what the scenario has of it. `verb` names what is written.
     `options` are those of every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is.
@@ -55,6 +68,7 @@ def compare(
     if backends and "backend" in options:
         raise UserError("backend, backends: give one or the other")
     resolved, names = as_scenario(scenario, quick), methods_of(methods, options, backends)
+    beside = measured_of(resolved, measured)
     require_number(checkpoint_every, "checkpoint_every", 0.0)
     if render_every is not None:
         require_number(render_every, "render_every", 1e-9)
@@ -80,7 +94,8 @@ def compare(
     runs = place.run(planned, verb)
     missing = lacking(runs, refusals=False)
     ok = any(run.ok for run in runs) and not missing
-    return Comparison(report(runs, place.store.root, verb), place.store.root, runs, missing, ok, keeper=place.keeper)
+    made = report(runs, place.store.root, verb, beside)
+    return Comparison(made, place.store.root, runs, missing, ok, keeper=place.keeper)
 
 
 def run(scenario: Scenario | str | Path, method: str, **more: Any) -> Run:

@@ -12,19 +12,21 @@ from ..measure.reference import DoesNotApply, martin_moyce
 from ..report.plot import Plot, Trace, colour
 from ..runs.record import Run
 from ..scenario import Scenario
+from ..scenario.measured import Measured
+from .compare_measured import points_along
 
 
-def plots(results: Sequence[Run]) -> list[Plot]:
-    """Every plot that the scenario gives rise to; only completed runs appear."""
+def plots(results: Sequence[Run], measured: Sequence[Measured] = ()) -> list[Plot]:
+    """Every plot that the scenario gives rise to: of completed runs, with what was `measured` along the path."""
     done = [r for r in results if r.ok and r.record.repeat == 0]
     if not done:
         return []
     scenario = done[0].scenario
-    beads = _bead_plots(done, scenario) if scenario.toolpath is not None else []
+    beads = _bead_plots(done, scenario, measured) if scenario.toolpath is not None else []
     return [p for p in [*beads, *_series_plots(done, scenario), *_cost_plots(results)] if p.traces]
 
 
-def _bead_plots(done: Sequence[Run], scenario: Scenario) -> list[Plot]:
+def _bead_plots(done: Sequence[Run], scenario: Scenario, measured: Sequence[Measured]) -> list[Plot]:
     """Cross-sections over one another, width and height along the path."""
     section = Plot(
         "cross_section", "cross-section at the middle of the path", "across the path [mm]", "height [mm]", equal=True
@@ -43,6 +45,8 @@ def _bead_plots(done: Sequence[Run], scenario: Scenario) -> list[Plot]:
         along = (1e3 * bead.station).tolist()
         width.traces.append(Trace(result.label, along, (1e3 * bead.width).tolist(), colour=colour(result.label)))
         height.traces.append(Trace(result.label, along, (1e3 * bead.height).tolist(), colour=colour(result.label)))
+    for plot in (width, height):
+        plot.traces.extend(points_along(plot.name, measured))
     return [section, width, height]
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 from ..method.verdict import Verdict
 from ..report.report import Report, machine_of, record_link
 from ..runs.record import Run
+from ..scenario.measured import Measured
+from .compare_measured import against_measured, measured_plot
 from .compare_plots import plots
 from .compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
 from .compare_views import views
@@ -21,12 +23,13 @@ ADVICE = {
 }
 
 
-def report(runs: Sequence[Run], root: Path, verb: str) -> Report:
-    """Tables, plots and views of finished runs. `compare` has the folder's report.html; any other verb in the same
-    folder has files of its own, under its name."""
+def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measured] = ()) -> Report:
+    """Tables, plots and views of finished runs, beside what was `measured`. `compare` has the folder's report.html;
+    any other verb in the same folder has files of its own, under its name."""
     import pandas as pd
 
-    made = (fidelity(runs), successes(runs), against_reference(runs), costs(runs), backends(runs))
+    beside = against_measured(runs, measured)
+    made = (fidelity(runs), successes(runs), beside, against_reference(runs), costs(runs), backends(runs))
     first = next((run for run in runs if run.record.input is not None), None)
     expected = first.scenario.warnings() if first else []
     met = [f"{run.label}: {line}" for run in runs for line in run.record.warnings if line not in expected]
@@ -37,7 +40,7 @@ def report(runs: Sequence[Run], root: Path, verb: str) -> Report:
         [],
         [table for table in made if table is not None],
         pd.DataFrame([{**run.record.row(), "reused": run.reused} for run in runs]),
-        plots(runs),
+        [*measured_plot(runs, measured), *plots(runs, measured)],
         {"records": [record_link(run, root, f"{run.label} #{run.record.repeat + 1}") for run in runs]},
         machine_of(runs),
         alarms=[*failed_prints(runs), *met],

@@ -9,7 +9,7 @@ from statistics import mean
 from ..measure.rest import LAST, STILL
 from ..measure.tower import Print
 from ..method.verdict import Evidence, evidence_of
-from ..report.table import Table, label, number, spread
+from ..report.table import Table, label, number, readable, spread
 from ..runs.record import Record, Run
 from .lengths import lengths_of
 
@@ -39,7 +39,9 @@ def fidelity(results: Sequence[Run]) -> Table:
     for key in keys:
         values = [[r.measures[key] for r in g if key in r.measures] for g in done.values()]
         marks = [MOVES if any(key in r.moving for r in g) else "" for g in done.values()]
-        table.rows.append([label(key), *[spread(v) + m if v else "-" for v, m in zip(values, marks, strict=True)]])
+        name, factor = readable(key, [value for own in values for value in own])
+        cells = [spread([factor * value for value in own]) if own else "-" for own in values]
+        table.rows.append([name, *[cell + mark for cell, mark in zip(cells, marks, strict=True)]])
     moving = any(r.moving for g in done.values() for r in g)
     return replace(table, note=f"{MOVES.strip()} still moves: {MOVED}") if moving else table
 

@@ -10,10 +10,11 @@ from typing import Any, Unpack
 
 from ..runs.job import Job
 from ..scenario import Scenario
+from ..scenario.measured import Measured
 from .result import Result
 from .select_report import report
 from .selection import FACTORS, Selection, assess
-from .workplace import Options, Workplace, as_scenario, methods_of, require_number
+from .workplace import Options, Workplace, as_scenario, measured_of, methods_of, require_number
 
 WALL_LIMIT = 900.0  # s
 
@@ -33,21 +34,24 @@ def select(
     budget: float = math.inf,
     pace: float = math.inf,
     called: str = "",
+    measured: str | Path | Sequence[Measured] = (),
     **options: Unpack[Options],
 ) -> Selected:
     """Recommend a method, spacing and time step: least cost within a `tolerance` (largest relative error of any
     length), within a `budget` of wall time [s] and a `pace` (wall s per simulated s), on this machine.
 
     Runs every method at four spacings. `scenario` is one, a shipped name or a TOML file; `methods` are names, default
-    all. `called` is the scenario's name in the command that it recommends. `options` are those of every verb, see
-    Options.
+    all. `called` is the scenario's name in the command that it recommends. `measured`: a table of what was measured on
+    a real print (CSV), which errors are then counted from, beside what the scenario has of it. `options` are those of
+    every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is.
     """
     require_number(tolerance, "tolerance", 1e-6)
     resolved, names = as_scenario(scenario), methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
-    found = assess(resolved, names, place.run(candidates(resolved, names, place), "select"))
+    beside = measured_of(resolved, measured)
+    found = assess(resolved, names, place.run(candidates(resolved, names, place), "select"), beside)
     made = report(resolved, called or resolved.name, found, tolerance, budget, pace, place.store.root)
     missing = found.missing()
     ok = bool(found.candidates) and not missing

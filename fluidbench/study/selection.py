@@ -9,7 +9,8 @@ A scenario without an exact answer gets its error estimated in three parts, all 
 - trust: a method is trusted when it passes most known answers of the scenario's own physics
   (scenarios/reference/known_answers.csv, made by `fluidbench validate`).
 
-A length with an exact answer (a bead's area) is judged against that alone.
+A length with an exact answer (a bead's area) is judged against that alone, and one that was measured on a real print
+against the measurement alone.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from ..measure.reference import table as reference
 from ..method.verdict import lacking
 from ..runs.record import Run
 from ..scenario import Scenario
+from ..scenario.measured import Measured
 from .lengths import lengths_of
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
@@ -141,8 +143,11 @@ def trust_of(scenario: Scenario, methods: Sequence[str]) -> dict[str, Trust]:
     return found
 
 
-def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> Selection:
-    """Errors of all candidates from finished runs."""
+def assess(
+    scenario: Scenario, methods: Sequence[str], runs: Sequence[Run], measured: Sequence[Measured] = ()
+) -> Selection:
+    """Errors of all candidates from finished runs, against what was `measured` where that is known."""
+    told = {one.key: one.value for one in measured if one.place is None and one.value}
     result = Selection([], trust_of(scenario, methods), {}, list(runs))
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
@@ -156,12 +161,21 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> S
             result.notes.append(f"{method}: left out, for want of it at some spacing: {', '.join(left)}")
         fits[method] = {key: extrapolate(own, key) for key in shared}
         result.limits[method] = {key: fit.limit for key, fit in fits[method].items()}
-        if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0])):
+        if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0]) | told):
             result.erratic.add(method)
     for run in runs:
         if restless := [key for key in run.record.moving if key in lengths_of(run.record)]:
             still = f"at spacing {run.record.spacing_m:.4g} m"
             result.notes.append(f"{run.method} {still}: not at rest at the end: {', '.join(restless)}")
+    found = {key for run in runs if run.ok for key in lengths_of(run.record)}
+    for one in measured:
+        judged = one.place is None and one.value and one.key in found
+        spread = f", known to {one.uncertainty / abs(one.value):.1%}" if judged and one.uncertainty is not None else ""
+        result.notes.append(
+            f"{one.words}: errors are from the measured {one.value:.4g}{spread}"
+            if judged
+            else f"{one.words}: measured, but no length that is judged here"
+        )
     consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
     if not trusted:
         result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
@@ -171,7 +185,7 @@ def assess(scenario: Scenario, methods: Sequence[str], runs: Sequence[Run]) -> S
         )
     for run in runs:
         if run.ok and run.method in fits:
-            result.candidates.append(_candidate(run, fits[run.method], consensus))
+            result.candidates.append(_candidate(run, fits[run.method], consensus, told))
     result.notes += [_unconverged(result, method) for method in fits if not result.converges(method)]
     return result
 
@@ -226,10 +240,10 @@ def _consensus(result: Selection) -> dict[str, float]:
     return {k: float(np.mean([result.limits[m][k] for m in voters if k in result.limits[m]])) for k in keys}
 
 
-def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float]) -> Candidate:
-    """The worst length decides."""
+def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float], told: dict[str, float]) -> Candidate:
+    """The worst length decides; `told` are those that were measured."""
     record = run.record
-    parts, exact = [(0.0, 0.0)], exact_lengths(run)
+    parts, exact = [(0.0, 0.0)], exact_lengths(run) | told
     for key, value in lengths_of(record).items():
         if key in exact:
             parts.append((abs(value / exact[key] - 1.0), 0.0))

@@ -25,6 +25,8 @@ from ..runs.work import Work
 from ..scenario import Scenario
 from ..scenario.layout import capacity_of
 from ..scenario.library import load
+from ..scenario.measured import Measured
+from ..scenario.measured import read as read_measured
 
 LEAST_SHARE = 1000  # particles that are worth a thread
 
@@ -139,6 +141,11 @@ def as_scenario(given: Scenario | str | Path, quick: bool = False) -> Scenario:
             )
         return given
     return load(given, quick=quick)
+
+
+def measured_of(scenario: Scenario, more: str | Path | Sequence[Measured]) -> tuple[Measured, ...]:
+    """What was measured: what the scenario has, and a table in a file, or rows of one."""
+    return (*scenario.measured, *(read_measured(more) if isinstance(more, str | Path) else more))
 
 
 def names_of(given: Any, what: str) -> list[Any] | None:

@@ -11,6 +11,7 @@ from fluidbench.scenario.collider import Collider, Part
 from fluidbench.scenario.cure import Cure
 from fluidbench.scenario.expansion import Expansion
 from fluidbench.scenario.material import Material
+from fluidbench.scenario.measured import Measured
 from fluidbench.scenario.toolpath import Toolpath
 
 from ..conftest import bead, scenario
@@ -25,6 +26,7 @@ MODELS = {
     "[nozzle]": [Nozzle],
     "[toolpath]": [Toolpath],
     "[collider]": [Collider, Part],
+    "[[measured]]": [Measured],
     "[[bodies]]": [Body],
     **{f"[numerics.{method}]": [get_method(method).Config] for method in ("mpm", "sph", "pbd")},
 }

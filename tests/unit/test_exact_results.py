@@ -161,7 +161,7 @@ def test_a_methods_colour_goes_by_its_place():
 
 
 def test_a_comparison_holds_what_it_was_asked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(compare_report, "plots", lambda _: [])
+    monkeypatch.setattr(compare_report, "plots", lambda *_: [])
     monkeypatch.setattr(compare_report, "views", lambda _: [])
     calls = working(
         monkeypatch, lambda job: finished(job.method, repeat=job.repeat, backend=job.target.backend, prepare_s=1.0)
@@ -201,7 +201,7 @@ def test_a_comparison_holds_what_it_was_asked_for(tmp_path, monkeypatch):
     ],
 )
 def test_a_comparison_is_whole_with_a_result_and_nothing_lacking(tmp_path, monkeypatch, verdicts, fine):
-    monkeypatch.setattr(compare_report, "plots", lambda _: [])
+    monkeypatch.setattr(compare_report, "plots", lambda *_: [])
     monkeypatch.setattr(compare_report, "views", lambda _: [])
     ends = dict(zip(("mpm", "sph"), verdicts, strict=True))
     working(monkeypatch, lambda job: finished(job.method, ends[job.method]))
@@ -209,7 +209,7 @@ def test_a_comparison_is_whole_with_a_result_and_nothing_lacking(tmp_path, monke
 
 
 def test_runs_without_a_folder_live_as_long_as_they_are_held(monkeypatch):
-    monkeypatch.setattr(compare_report, "plots", lambda _: [])
+    monkeypatch.setattr(compare_report, "plots", lambda *_: [])
     monkeypatch.setattr(compare_report, "views", lambda _: [])
     working(monkeypatch)
     run = module.run(BEAD, "mpm", progress=False)  # its result is gone, its folder is not

@@ -55,10 +55,10 @@ def test_fidelity_has_a_column_a_method_and_hides_the_ledger():
     assert table.head == ["", "mpm", "sph"] and table.rows == [
         ["verdict", "completed", "completed, diverged"],
         ["print", "-", "broken"],
-        ["bead width [m]", "0.011 ± 0.001", "-"],
+        ["bead width [mm]", "11 ± 1", "-"],
         ["slump", "-", "0.5"],
     ]
-    assert [row[0] for row in fidelity(runs[:2]).rows] == ["verdict", "bead width [m]"]
+    assert [row[0] for row in fidelity(runs[:2]).rows] == ["verdict", "bead width [mm]"]
     odd = fidelity([finished(measures={"potential_energy_J": 1.0, "angular_momentum_x_kg_m2_s": 1.0, "top_m": 1.0})])
     assert [row[0] for row in odd.rows] == ["verdict", "top [m]"]
 
