@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import UserError, quoted
+from ..scenario.units import in_si
 
 if TYPE_CHECKING:
     from ..scenario import Scenario
@@ -21,7 +22,23 @@ MOST_REPEATS = 1000
 SHORTEST, LONGEST = 1e-3, 3.2e7  # wall time that a run may be given [s]
 ScenarioName = Annotated[str, typer.Argument(help="a shipped scenario (see `fluidbench list`) or a TOML file")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="override a key, e.g. material.yield_stress=50")]
-Spacing = Annotated[float | None, typer.Option(help="particle spacing [m], instead of the scenario's")]
+
+
+def length(text: str) -> float:
+    """'0.002' or '2 mm' -> 0.002; raises UserError for what is no length."""
+    try:
+        return float(in_si(text, "m"))
+    except ValueError as error:
+        why = str(error) if "kind" in str(error) or "unit" in str(error) else f"got {quoted(text)}"
+        raise UserError(f"--spacing takes a length such as 0.002 or 2mm: {why}") from None
+
+
+Spacing = Annotated[
+    float | None,
+    typer.Option(
+        parser=length, metavar="LENGTH", help="particle spacing, as 0.002 [m] or 2mm, instead of the scenario's"
+    ),
+]
 Solvers = Annotated[
     str | None, typer.Option(help="methods, separated by commas; default all that are installed", show_default=False)
 ]

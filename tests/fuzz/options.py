@@ -46,6 +46,7 @@ HAS = {
     "--colour": ("render",),
     "--solver": ("run",),
     "--checkpoint-every": ("compare", "run"),
+    "--measured": ("compare", "run", "select"),
     "--set": ("compare", "run", "stability", "ablate", "select", "table1", "show"),
 }
 """Option with a value -> verbs; a test holds it against the application."""
@@ -292,6 +293,20 @@ def verbs(rng: random.Random) -> Iterator[Case]:
     for where in ("missing", "", ".", "/dev/null", "file", "empty", "x" * 5000, "a\x00b", "\udcff"):
         told = ("no run", "record.json", "run")
         yield Case(sort, ("render", where), names=told, files={"file": b"x"}, folders=("empty",))
+    for verb, where in itertools.product(
+        HAS["--measured"], ("missing", "", ".", "/dev/null", "file", "x" * 5000, "a\x00b")
+    ):
+        told = ("missing", "file", "x" * 9, "null", "'.'", "a")
+        yield Case(sort, command(verb, f"--measured={where}"), names=told, files={"file": b"\xff\x00,"})
+    for junk in (
+        "quantity,value\nwidth,nan",
+        "quantity,value\nwidth,1e99",
+        "value,value\n1,2",
+        '"',
+        "quantity,value\n,",
+    ):
+        more = command("compare", "--measured=m.csv")
+        yield Case(sort, more, names=("m.csv",), files={"m.csv": junk.encode()})
     for junk in (b"", b"\x00\xff" * 50, b"[]", b"5", b"{}", b"null", b'{"verdict": "completed"}', b'{"input": 5}'):
         files = {"run/record.json": junk, "run/final.npz": junk}
         yield Case(sort, ("render", "run"), names=("record.json", "no run", "no particles"), files=files)
