@@ -7,10 +7,10 @@ from typing import NoReturn
 import typer
 
 from ..errors import Interrupted, Obstacle, UserError, quoted
-from . import engines, info, pictures, runs, studies
+from . import engines, info, pictures, runs, start, studies
 from .app import app
 
-__all__ = ["app", "engines", "info", "main", "pictures", "runs", "studies"]
+__all__ = ["app", "engines", "info", "main", "pictures", "runs", "start", "studies"]
 USAGE = typer.BadParameter.__base__  # what the parser raises; its module differs between versions
 MOST_LINES = 6
 

@@ -48,7 +48,7 @@ def fidelity(results: Sequence[Run]) -> Table:
 
 def against_reference(results: Sequence[Run]) -> Table | None:
     """Measured value, reference and error of every answer; None when the scenario has none."""
-    table = Table("Against references", ["", "method", "measured", "reference", "error", "measure", "source"])
+    table = Table("Against references", ["", "method", "computed", "reference", "error", "measure", "source"])
     reasons = dict.fromkeys(line for r in results for line in r.record.not_compared)
     for result in results:
         if result.record.repeat == 0:

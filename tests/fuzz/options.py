@@ -22,8 +22,9 @@ BARE: dict[str, tuple[str, ...]] = {
     "render": ("render", "missing"),
     "list": ("list",),
     "doctor": ("doctor",),
+    "init": ("init", "--defaults"),
 }
-WITHOUT_OUT = ("show", "render", "list", "doctor")
+WITHOUT_OUT = ("show", "render", "list", "doctor", "init")
 STUDIES = tuple(verb for verb in BARE if verb not in WITHOUT_OUT)
 HAS = {
     "--solvers": ("compare", "validate", "stability", "bench", "ablate", "select", "table2"),
