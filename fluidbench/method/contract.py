@@ -219,6 +219,11 @@ class Method(ABC):
         return config
 
     @classmethod
+    def weight_of_a_step(cls, scenario: Scenario, config: Any) -> float:
+        """What a substep costs over one at the typical rate, for estimates only."""
+        return 1.0
+
+    @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> Sequence[Economy]:
         """What `ablate` may relax, in the method's own numerics."""
         return ()

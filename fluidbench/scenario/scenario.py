@@ -239,12 +239,16 @@ class Scenario(Model):
 
     @cached_property
     def reference_speed(self) -> float:
-        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, expanding, or sqrt(g H)."""
+        """The fastest speed that the scenario itself implies [m/s]: initial, extruded, expanding, or sqrt(g H). H is
+        the height of what is there; of what leaves the nozzle the gap below it, or its height above the floor where
+        nothing that is laid would stand."""
         g = float(np.linalg.norm(self.acceleration))
         speeds, height = [1e-3], 0.0
-        if self.track is not None:
+        if self.track is not None and self.nozzle is not None:
             speeds += [self.feeding_speed, float(self.track.speed_in.max())]
-            height = float(self.track.position[:, 2].max()) - self.domain.lower[2]
+            stands = self.material.youngs_modulus is not None and self.material.relaxation_time is None
+            top = float(self.track.position[:, 2].max()) - self.domain.lower[2]
+            height = self.nozzle.standoff if stands else top
         for body in self.bodies:
             speeds.append(self._top_speed(body))
             speeds.append(math.sqrt(np.abs(self.gradient).max()) * float(np.linalg.norm(body.extent)))

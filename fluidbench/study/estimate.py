@@ -38,6 +38,7 @@ def estimate(scenario: Scenario, solver: type[Method]) -> Estimate:
     particles = capacity_of(scenario)
     filling = min(scenario.track.end / scenario.duration, 1.0) if scenario.track is not None else 0.0
     mean = particles * (1.0 - 0.5 * filling)
+    weight = solver.weight_of_a_step(scenario, config)
     return Estimate(
         method=solver.name,
         refusal=refusal(solver, scenario, config),
@@ -47,5 +48,5 @@ def estimate(scenario: Scenario, solver: type[Method]) -> Estimate:
         particles=particles,
         substeps=substeps,
         memory_bytes=memory_needed(scenario, solver),
-        wall_s=None if substeps is None else substeps * mean / solver.typical_rate,
+        wall_s=None if substeps is None else weight * substeps * mean / solver.typical_rate,
     )

@@ -72,6 +72,10 @@ class SolverMPM(Solver):
     axes: ClassVar = (NumericalAxis("particles_per_cell", "grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-", 1 / 3),)
 
     @classmethod
+    def weight_of_a_step(cls, scenario: Scenario, config: Any) -> float:
+        return WORTH if config.viscosity == "implicit" else 1.0
+
+    @classmethod
     def decided(cls, scenario: Scenario, config: Any) -> Any:
         return decided(cls, scenario, config, math.inf if scenario.domain.rubs else WORTH)
 

@@ -212,6 +212,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         phases: Phases,
         phase_of: Ints,
         held: Ints,
+        growth: Floats,
         elastic_normal: Vectors,
         elastic_shear: Vectors,
         off_linear: Vectors,
@@ -244,6 +245,8 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     off = (vector_at(sums, 22) - gradient @ first_moment) / rho
                     if least_eigenvalue(moment / rho) < SOUND:
                         off, z = vec3(0.0), vec3(0.0)
+                        if ti.static(changing):
+                            approach -= rho * growth[i]
                     if held[i] != CARRIED:
                         kept = 1.0
                         b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h)
@@ -254,16 +257,16 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 else:
                     second, approach = sums[7], sums[8]
                     sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
-                growth, crowd = approach, vector_at(sums, 4) / rho
+                inflow, crowd = approach, vector_at(sums, 4) / rho
                 if flows and not is_solid(phase):
-                    growth += (
+                    inflow += (
                         num.density_feedback * sound / num.h * drifted(num, phase, rho, rest, second, first_moment)
                     )
-                    growth += 2.0 * num.density_diffusion * num.h * sound * spread / rho
+                    inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
                 shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
-                rho += h * growth
+                rho += h * inflow
                 if rho <= -rest or beyond(rho, CRUSHED * rest):
                     ti.atomic_or(fault[0], FAULT_STATE)
                 rho = ti.max(rho, FLOOR * rest)

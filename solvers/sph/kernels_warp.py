@@ -48,6 +48,7 @@ class Straining:
     phases: wp.array2d(dtype=Phase)
     phase_of: wp.array(dtype=int)
     held: wp.array(dtype=int)
+    growth: wp.array(dtype=float)  # of the rest volume; one zero where nothing changes [1/s]
     elastic_normal: wp.array(dtype=wp.vec3)
     elastic_shear: wp.array(dtype=wp.vec3)
     off_linear: wp.array(dtype=wp.vec3)
@@ -189,6 +190,8 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
             s = data.elastic_shear[i]
             # the gradient of a straggler is not exact even in a linear flow
             whole = float(least_eigenvalue(moment / rho) >= SOUND)
+            if wp.static(changing):
+                inflow -= (1.0 - whole) * rho * data.growth[i]  # nothing is there that it would have to push away
             z = whole * data.off_linear[i]
             q = (whole / rho) * (wp.vec3(sums[22], sums[23], sums[24]) - gradient * first_moment)
             if data.held[i] != CARRIED:
