@@ -20,6 +20,7 @@ from .material import Material
 from .measured import Measured
 from .model import Matrix, Model, Positive, Vector
 from .nozzle import Nozzle
+from .plausible import warnings
 from .slicer import completed
 from .toolpath import Toolpath, Track
 
@@ -347,30 +348,5 @@ class Scenario(Model):
         return tick, max(1, round(self.duration / tick)), per_output
 
     def warnings(self) -> list[str]:
-        """Values whose order of magnitude suggests a wrong unit."""
-        m, out = self.material, []
-        plausible = (
-            ("material.density", m.density, 10, 2e4, "kg/m^3"),
-            ("material.youngs_modulus", m.youngs_modulus, 10, 1e12, "Pa"),
-            ("material.viscosity", m.viscosity or None, 1e-6, 1e6, "Pa s"),
-            ("material.yield_stress", m.yield_stress or None, 1e-2, 1e8, "Pa"),
-            ("spacing", self.spacing, 1e-5, 0.2, "m"),
-            ("nozzle.diameter", self.nozzle and self.nozzle.diameter, 1e-4, 0.5, "m"),
-            ("nozzle speed", self.nozzle and self.nozzle.speed, 1e-5, 50, "m/s"),
-            ("toolpath.speed", self.toolpath and (self.toolpath.speed or None), 1e-5, 50, "m/s"),
-            ("gravity", float(np.linalg.norm(self.gravity)) or None, 0.1, 100, "m/s^2"),
-        )
-        for key, value, low, high, unit in plausible:
-            if value is not None and not low <= value <= high:
-                out.append(f"{key} = {value:g} {unit} is outside the usual {low:g} .. {high:g}; is it in {unit}?")
-        if self.wave_speed < 3 * self.reference_speed:
-            out.append(
-                f"the material's wave speed ({self.wave_speed:.3g} m/s) is below 3 times the scenario's speed "
-                f"({self.reference_speed:.3g} m/s): expect visible compression"
-            )
-        if m.bulk(self.liquid_sound_speed) < 10 * self.feeding_pressure:
-            out.append(
-                f"viscosity times speed over the nozzle's diameter ({self.feeding_pressure:.3g} Pa) is over a tenth of "
-                f"the material's bulk modulus ({m.bulk(self.liquid_sound_speed):.3g} Pa): expect visible compression"
-            )
-        return out
+        """Values whose order of magnitude suggests a wrong unit, and what makes visible compression."""
+        return warnings(self)
