@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import UserError, quoted
-from ..scenario.units import in_si
+from ..scenario.units import amount
 
 if TYPE_CHECKING:
     from ..scenario import Scenario
@@ -27,10 +27,9 @@ Settings = Annotated[list[str] | None, typer.Option("--set", help="override a ke
 def length(text: str) -> float:
     """'0.002' or '2 mm' -> 0.002; raises UserError for what is no length."""
     try:
-        return float(in_si(text, "m"))
+        return amount(text, "m")
     except ValueError as error:
-        why = str(error) if "kind" in str(error) or "unit" in str(error) else f"got {quoted(text)}"
-        raise UserError(f"--spacing takes a length such as 0.002 or 2mm: {why}") from None
+        raise UserError(f"--spacing takes a length such as 0.002 or 2mm: {error}") from None
 
 
 Spacing = Annotated[

@@ -45,8 +45,8 @@ class Bead:
 
 
 def measure_bead(deposit: Deposit, scenario: Scenario, laid: float = 1.0) -> Bead | None:
-    """Sections every spacing along the first layer's path, of which the nozzle has come the share `laid`; None without
-    a moving nozzle."""
+    """Sections every spacing along the longest stroke of the first layer, of which the nozzle has come the share
+    `laid`; None without a moving nozzle."""
     path, nozzle = scenario.toolpath, scenario.nozzle
     if path is None or nozzle is None or scenario.track is None or path.speed == 0:
         return None
@@ -69,12 +69,11 @@ def measure_bead(deposit: Deposit, scenario: Scenario, laid: float = 1.0) -> Bea
 
 def stations(scenario: Scenario) -> np.ndarray:
     """Distances along the path at which sections are taken [m]: every spacing, 12 at least and 160 at most, without
-    those where nothing is laid, and those beside a corner, which would cut the other leg as well."""
+    those beside a corner, which would cut the other leg as well."""
     assert scenario.track is not None and scenario.nozzle is not None
     stroke = scenario.track.stroke
     length = stroke.distance[-1]
     station = np.linspace(0.0, length, int(np.clip(length / scenario.spacing, 12, 160)))
-    station = station[stroke.fed[leg_at(scenario, station)] > 0]
     legs = np.diff(stroke.points, axis=0) / np.diff(stroke.distance)[:, None]
     sharp = stroke.distance[1:-1][(legs[1:] * legs[:-1]).sum(axis=1) < STRAIGHT]
     apart = np.abs(station[:, None] - sharp).min(axis=1, initial=np.inf) >= BESIDE * scenario.nozzle.diameter
@@ -102,7 +101,7 @@ def in_middle(share: np.ndarray) -> np.ndarray:
 
 
 def laid_share(birth_time: np.ndarray, scenario: Scenario) -> float:
-    """Share of the first layer's path that the nozzle has come when the last of these particles left it."""
+    """Share of the measured stroke that the nozzle has come when the last of these particles left it."""
     path, track, nozzle = scenario.toolpath, scenario.track, scenario.nozzle
     if path is None or track is None or nozzle is None or path.speed == 0 or not len(birth_time):
         return 1.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +15,18 @@ if TYPE_CHECKING:
     from ..runs.record import Run
 
 
-def computed(run: Run, measured: Measured) -> float:
-    """The value in a finished run [SI]; NaN where it has none."""
-    if measured.place is None:
-        return run.record.measures.get(measured.key, float("nan"))
-    frame = run.frame()
-    bead = bead_of(frame, deposit_of(frame, run.scenario), run.scenario)
-    if bead is None or not bead.station[0] <= measured.place <= bead.station[-1]:
-        return float("nan")
-    return float(np.interp(measured.place, bead.station, getattr(bead, ALONG[measured.key])))
+def computed(run: Run, measured: Sequence[Measured]) -> list[float]:
+    """The values in a finished run [SI], NaN where it has none."""
+    bead = None
+    if any(one.place is not None for one in measured):
+        frame = run.frame()
+        bead = bead_of(frame, deposit_of(frame, run.scenario), run.scenario)
+    found = []
+    for one in measured:
+        if one.place is None:
+            found.append(run.record.measures.get(one.key, math.nan))
+        elif bead is None or not bead.station[0] <= one.place <= bead.station[-1]:
+            found.append(math.nan)
+        else:
+            found.append(float(np.interp(one.place, bead.station, getattr(bead, ALONG[one.key]))))
+    return found

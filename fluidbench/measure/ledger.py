@@ -54,7 +54,7 @@ def bead_of(frame: Frame, deposit: Deposit, scenario: Scenario) -> Bead | None:
     births = frame["birth_time"][free]
     if path is None or track is None:
         return None
-    if not path.repeats:
+    if not track.repeats:
         own = (births >= track.stroke.time[0]) & (births <= track.stroke.time[-1])
         births = births[own]
         deposit = Deposit.of(
@@ -66,9 +66,9 @@ def bead_of(frame: Frame, deposit: Deposit, scenario: Scenario) -> Bead | None:
 def beads(frame: Frame, deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     """Section of the bead and rise of the layers along what was laid of the path."""
     bead, path, free = bead_of(frame, deposit, scenario), scenario.toolpath, frame["held"] != CARRIED
-    if bead is None or path is None:
+    if bead is None or path is None or scenario.track is None:
         return {}
-    if not path.repeats:
+    if not scenario.track.repeats:
         return bead.summary(1)
     rises = layer_heights(frame["position"][free], frame["birth_time"][free], scenario)
     return bead.summary(path.layers) | {f"layer_{i}_height_m": rise for i, rise in enumerate(rises, 2)}

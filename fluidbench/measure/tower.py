@@ -45,8 +45,8 @@ class Criterion:
 
 
 def is_tower(scenario: Scenario) -> bool:
-    path = scenario.toolpath
-    return path is not None and path.layers > 1 and path.speed > 0 and path.repeats
+    path, track = scenario.toolpath, scenario.track
+    return path is not None and track is not None and path.layers > 1 and path.speed > 0 and track.repeats
 
 
 def layer_of(frame: Frame, scenario: Scenario) -> np.ndarray:
@@ -94,10 +94,10 @@ def path_heights(deposit: Deposit, scenario: Scenario) -> np.ndarray:
     """Height of the deposit over each sector of the middle of the path, shape (sectors,) [m]: where the field, averaged
     along the sector, is half full for the last time, at the best of the lines within a quarter of the nozzle from the
     path. A lone particle fills no half of a sector that is SHORTEST cells long."""
-    path, nozzle = scenario.toolpath, scenario.nozzle
-    assert path is not None and nozzle is not None
+    track, nozzle = scenario.track, scenario.nozzle
+    assert track is not None and nozzle is not None
     reach = max(nozzle.diameter / 4, scenario.spacing)
-    corners, edges = path.corners(), _sector_edges(scenario)
+    corners, edges = track.stroke.points, _sector_edges(scenario)
     low, high = (deposit.place(c) for c in (corners.min(axis=0) - reach, corners.max(axis=0) + reach))
     i, j = (grid.ravel() for grid in np.meshgrid(*map(np.arange, low, high + 1), indexing="ij"))
     x, y = (deposit.origin[axis] + deposit.spacing * index for axis, index in enumerate((i, j)))
@@ -126,9 +126,9 @@ def plan_height(scenario: Scenario) -> float:
 def _sector_edges(scenario: Scenario) -> np.ndarray:
     """Edges of the sectors of the middle of the path, as shares of it: all of a closed path; of an open one all but a
     nozzle's diameter (a quarter at most) at each end, where the nozzle turns."""
-    path, nozzle = scenario.toolpath, scenario.nozzle
-    assert path is not None and nozzle is not None
-    length = path.length()
+    path, nozzle, track = scenario.toolpath, scenario.nozzle, scenario.track
+    assert path is not None and nozzle is not None and track is not None
+    length = track.stroke.distance[-1]
     margin = 0.0 if path.kind == "ring" else min(nozzle.diameter / length, 0.25)
     count = int(np.clip(length * (1.0 - 2.0 * margin) / (SHORTEST * scenario.spacing), 1, SECTORS))
     return np.linspace(margin, 1.0 - margin, count + 1)
@@ -141,14 +141,14 @@ def _in_middle(along: np.ndarray, scenario: Scenario) -> np.ndarray:
 
 def _path_coordinates(x: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(share of the path 0..1, distance across it [m], height above the floor [m]) of points (n, 3)."""
-    path = scenario.toolpath
-    assert path is not None
+    path, track = scenario.toolpath, scenario.track
+    assert path is not None and track is not None
     up = x[:, 2] - scenario.domain.lower[2]
     if path.kind == "ring":
         arm = x[:, :2] - np.asarray(path.center)
         angle = np.arctan2(arm[:, 1], arm[:, 0]) / (2 * np.pi) % 1.0
         return angle, np.hypot(arm[:, 0], arm[:, 1]) - (path.radius or 0.0), up
-    corners = path.corners()
+    corners = track.stroke.points
     legs = np.diff(corners, axis=0)
     lengths = np.linalg.norm(legs, axis=1)
     best = np.full(len(x), np.inf)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .frame import Frame
 
 ENERGY_FACTOR = 2.0  # kinetic energy beyond this many times what was ever supplied comes from the method
-SPEED_FACTOR = 3.0  # matter faster than this many times (wave speed + reference speed) is no solution
+SPEED_FACTOR = 3.0  # matter faster than this many times (wave speed + reference or falling speed) is no solution
 PRESSED = 0.05  # energy of spawned children that lie over each other, over mass and wave speed squared
 
 
@@ -35,7 +35,7 @@ class Vital:
 
 def top_speed(scenario: Scenario, wave_speed: float) -> float:
     """Faster than this nothing moves that comes from the scenario [m/s]."""
-    return SPEED_FACTOR * (wave_speed + scenario.reference_speed)
+    return SPEED_FACTOR * (wave_speed + max(scenario.reference_speed, scenario.falling_speed()))
 
 
 def mass_energy(scenario: Scenario, wave_speed: float) -> float:

@@ -8,7 +8,8 @@ from .expansion import Expansion
 from .material import Material
 from .nozzle import Nozzle
 from .scenario import Scenario
-from .toolpath import Toolpath, Track
+from .toolpath import Toolpath
+from .track import Track
 
 __all__ = [
     "Body",

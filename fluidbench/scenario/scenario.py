@@ -20,15 +20,16 @@ from .material import Material
 from .measured import Measured
 from .model import Matrix, Model, Positive, Vector
 from .nozzle import Nozzle
+from .places import check_bodies, check_collider, check_nozzle
 from .plausible import warnings
 from .slicer import completed
-from .toolpath import Toolpath, Track
+from .toolpath import Toolpath
+from .track import Track
 
 if TYPE_CHECKING:
     from .layout import Layout
 
 LONGEST_NAME = 80
-VOLUMES = 2.0  # largest factor between a particle's own volume and spacing^3
 AGES = 65  # ages at which bounds look at a material that changes
 
 
@@ -98,11 +99,11 @@ class Scenario(Model):
             partial(check_size, self),
             self._check_fields,
             partial(check_time, self),
-            self._check_nozzle,
-            self._check_bodies,
+            partial(check_nozzle, self),
+            partial(check_bodies, self),
             self._check_periodic,
             self._check_force,
-            self._check_collider,
+            partial(check_collider, self),
         ):
             check()
         return self
@@ -112,47 +113,6 @@ class Scenario(Model):
             raise ValueError("nozzle and toolpath belong together: give both or neither")
         if self.nozzle is None and not self.bodies:
             raise ValueError("nothing to simulate: give bodies, or a nozzle with a toolpath")
-
-    def _check_nozzle(self) -> None:
-        if self.nozzle is None or self.track is None:
-            return
-        if self.spacing > self.nozzle.diameter / 2:
-            raise ValueError(
-                f"spacing = {self.spacing} is too coarse for nozzle.diameter = {self.nozzle.diameter}: "
-                "at least 2 particles must fit across it, 8 resolve a bead"
-            )
-        r = self.nozzle.diameter / 2
-        margin = np.array([r, r, 0.0])
-        low, high = self.track.position.min(axis=0) - margin, self.track.position.max(axis=0) + margin
-        for axis, a, b in zip("xyz", low, high, strict=True):
-            i = "xyz".index(axis)
-            if a < self.domain.lower[i] or b > self.domain.upper[i]:
-                what = "nozzle (standoff and layers)" if axis == "z" else "toolpath (with the nozzle's radius)"
-                raise ValueError(
-                    f"the {what} spans {axis} = {a:.6g} .. {b:.6g} m and leaves the domain, which spans "
-                    f"{self.domain.lower[i]:.6g} .. {self.domain.upper[i]:.6g} m"
-                )
-
-    def _check_bodies(self) -> None:
-        for i, body in enumerate(self.bodies):
-            low, high = np.asarray(body.center) - body.extent, np.asarray(body.center) + body.extent
-            if (high <= self.domain.lower).any() or (low >= self.domain.upper).any():
-                raise ValueError(f"bodies.{i} lies outside the domain")
-            if body.positions is None and (2 * body.extent < self.spacing).any():
-                raise ValueError(f"bodies.{i} is thinner than one particle spacing ({self.spacing} m)")
-            self._check_volumes(i, body)
-            if body.start > 0 and body.start > self.duration - self.schedule[0]:
-                raise ValueError(f"bodies.{i}: start = {body.start} s is not before the last tick of {self.duration} s")
-
-    def _check_volumes(self, i: int, body: Body) -> None:
-        if body.volumes is None:
-            return
-        low, high = (float(v) / self.spacing**3 for v in (body.volumes.array.min(), body.volumes.array.max()))
-        if low < 1 / VOLUMES or high > VOLUMES:
-            raise ValueError(
-                f"bodies.{i}: volumes span {low:.3g} .. {high:.3g} spacing^3; a particle stands for one, within a "
-                f"factor of {VOLUMES:g}"
-            )
 
     def _check_fields(self) -> None:
         """What expressions and arrays come to at the very particles; before anything is derived of them."""
@@ -182,24 +142,6 @@ class Scenario(Model):
     def _check_force(self) -> None:
         if self.body_force_gradient is not None and not np.allclose(self.gradient, self.gradient.T):
             raise ValueError("body_force_gradient must be symmetric: only then has the force a potential")
-
-    def _check_collider(self) -> None:
-        if self.collider is None:
-            return
-        if self.track is None or self.nozzle is None:
-            raise ValueError("collider: it is carried along the toolpath; give nozzle and toolpath")
-        start, r = self.track.at(0.0), self.nozzle.diameter / 2
-        for i, body in enumerate(self.bodies):
-            low, high = np.asarray(body.center) - body.extent, np.asarray(body.center) + body.extent
-            grid = [np.linspace(a, b, 9) for a, b in zip(low, high, strict=True)]
-            points = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 3)
-            if (self.collider.distance(points - start) < 0).any():
-                raise ValueError(f"collider: it starts inside bodies.{i}; raise collider.clearance or move the body")
-        jet = np.array(
-            [[x, y, z] for x in (-r, 0, r) for y in (-r, 0, r) for z in np.linspace(-self.nozzle.standoff, 0, 9)]
-        )
-        if (self.collider.distance(jet) < 0).any():
-            raise ValueError("collider: it starts inside the material that leaves the nozzle; raise collider.clearance")
 
     @cached_property
     def track(self) -> Track | None:
@@ -243,22 +185,27 @@ class Scenario(Model):
         """The fastest speed that the scenario itself implies [m/s]: initial, extruded, expanding, or sqrt(g H). H is
         the height of what is there; of what leaves the nozzle the gap below it, or its height above the floor where
         nothing that is laid would stand."""
-        g = float(np.linalg.norm(self.acceleration))
-        speeds, height = [1e-3], 0.0
+        speeds, gap = [1e-3], 0.0
         if self.track is not None and self.nozzle is not None:
             speeds += [self.feeding_speed, float(self.track.speed_in.max())]
             stands = self.material.youngs_modulus is not None and self.material.relaxation_time is None
-            top = float(self.track.position[:, 2].max()) - self.domain.lower[2]
-            height = self.nozzle.standoff if stands else top
+            gap = self.nozzle.standoff if stands else math.inf
         for body in self.bodies:
             speeds.append(self._top_speed(body))
             speeds.append(math.sqrt(np.abs(self.gradient).max()) * float(np.linalg.norm(body.extent)))
-            height = max(height, float(body.center[2] + body.extent[2]) - self.domain.lower[2])
         if (expansion := self.material.expansion) is not None:
             sizes = [float(np.linalg.norm(body.extent)) for body in self.bodies]
             sizes += [self.nozzle.diameter / 2] if self.nozzle is not None else []
             speeds.append(expansion.speed(max(sizes)))
-        return max(*speeds, math.sqrt(g * height))
+        return max(*speeds, self.falling_speed(gap))
+
+    def falling_speed(self, gap: float = math.inf) -> float:
+        """sqrt(g H) [m/s], of H the height above the floor of bodies and of the nozzle, of this at most a gap [m]."""
+        floor = self.domain.lower[2]
+        heights = [float(body.center[2] + body.extent[2]) - floor for body in self.bodies]
+        if self.track is not None:
+            heights.append(min(float(self.track.position[:, 2].max()) - floor, gap))
+        return math.sqrt(float(np.linalg.norm(self.acceleration)) * max(*heights, 0.0))
 
     @property
     def feeding_speed(self) -> float:

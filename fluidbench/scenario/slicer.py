@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from ..errors import quoted
 from . import gcode
-from .toolpath import SAME
-from .units import in_si
+from .track import SAME
+from .units import amount
 
 FILAMENT = 1.75e-3  # usual diameter [m]
 NAMED, LONGEST = 12, 60  # line numbers of a code that are named, characters of it that are shown
@@ -99,9 +98,9 @@ def _check(path: dict[str, Any], nozzle: dict[str, Any]) -> None:
 def _number(value: Any, key: str) -> float:
     """A length as a table holds it before it is validated [m]."""
     try:
-        return float(in_si(value, "m"))
-    except (TypeError, ValueError):
-        raise ValueError(f"{key}: a length is wanted (got {quoted(value)})") from None
+        return amount(value, "m")
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from None
 
 
 def _volumes(program: gcode.Program, path: dict[str, Any], nozzle: dict[str, Any]) -> np.ndarray:

@@ -63,9 +63,10 @@ class Stream:
     def velocity(self) -> np.ndarray:
         """Velocity of each disc at its release, shape (layers, 3) [m/s]: the nozzle's plus the exit speed downwards."""
         assert self.scenario.nozzle is not None and self.scenario.track is not None
-        track, time = self.scenario.track, self.release_time - 1e-12
-        down = self.scenario.nozzle.speed * track.flow(time)
-        return track.velocity(time) - down[:, None] * [0.0, 0.0, 1.0]
+        track = self.scenario.track
+        i = track.interval(self.extruding)
+        down = self.scenario.nozzle.speed * track.flow_in[i]
+        return track.velocity_in[i] - down[:, None] * [0.0, 0.0, 1.0]
 
     @property
     def volume(self) -> float:

@@ -1,8 +1,6 @@
-"""Where the nozzle is and how much it extrudes, as a function of time: line, polyline, ring, wall, or G-code."""
+"""The path of the nozzle: a line, polyline, ring or wall, or the moves of a file of G-code."""
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -29,7 +27,6 @@ USERS = {
     "ignored": ("gcode",),
 }
 """Keys that only some shapes use."""
-SAME = 1e-6  # places that are one [m]
 RING_CHORDS = 180  # a ring is travelled as a polygon of this many chords; its radius errs by 1.5e-4
 
 
@@ -91,7 +88,7 @@ class Toolpath(Model):
             raise ValueError(f"a polyline needs at least two points, got {len(self.points)}")
         if self.moves is not None:
             _check_moves(self.moves.array)
-        if self.speed > 0 and self.length() == 0:
+        elif self.speed > 0 and self.length() == 0:
             raise ValueError("the path has no length; give end, or speed = 0 with dwell")
         self._check_legs()
         return self
@@ -109,10 +106,7 @@ class Toolpath(Model):
             raise ValueError("flows: none of the legs extrudes")
 
     def corners(self) -> np.ndarray:
-        """The points of one layer, shape (n, 2) [m]; of G-code, of the longest stroke of the first."""
-        if self.moves is not None:
-            points = self.moves.array[longest(self.moves.array), :2]
-            return points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0])]
+        """The points of one layer of a shape, (n, 2) [m]."""
         if self.kind == "ring":
             assert self.center is not None and self.radius is not None
             angle = np.linspace(0.0, 2.0 * np.pi, RING_CHORDS + 1)
@@ -134,24 +128,9 @@ class Toolpath(Model):
         order = slice(None, None, -1 if backwards else 1)
         return corners[order], (ways / speeds)[order], flows[order]
 
-    @cached_property
-    def repeats(self) -> bool:
-        """Whether every layer goes over the first, there or back: one stroke each, at the same places in plan."""
-        if self.moves is None:
-            return True
-        lines = [self.moves.array[rows, :2] for rows in strokes(self.moves.array)]
-        return len(lines) == self.layers and all(_same(line, lines[0]) for line in lines)
-
     def length(self) -> float:
-        """Length of one layer [m]."""
+        """Length of one layer of a shape [m]."""
         return float(np.linalg.norm(np.diff(self.corners(), axis=0), axis=1).sum())
-
-
-def _same(line: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two lines go through the same points, there or back."""
-    if len(line) != len(other):
-        return False
-    return any(bool((np.linalg.norm(way - other, axis=1) <= SAME).all()) for way in (line, line[::-1]))
 
 
 def _check_moves(moves: np.ndarray) -> None:
@@ -160,125 +139,6 @@ def _check_moves(moves: np.ndarray) -> None:
         raise ValueError(f"moves: rows of x, y, z, seconds, flow and layer are wanted (got shape {moves.shape})")
     if (moves[1:, 3] <= 0).any() or (moves[:, 4] < 0).any() or (np.diff(moves[:, 5]) < 0).any():
         raise ValueError("moves: seconds are positive, flows are not negative, and layers do not fall")
-
-
-def strokes(moves: np.ndarray) -> list[np.ndarray]:
-    """What is laid without a stop in one layer: the indices of the rows of each stroke, its start included."""
-    laid = moves[1:, 4] > 0
-    breaks = np.flatnonzero(~laid[1:] | ~laid[:-1] | (np.diff(moves[1:, 5]) > 0)) + 1
-    parts = np.split(np.arange(len(laid)), breaks)
-    return [np.arange(part[0], part[-1] + 2) for part in parts if laid[part[0]]]
-
-
-def longest(moves: np.ndarray) -> np.ndarray:
-    """Rows of the longest stroke of the first layer."""
-    first = [rows for rows in strokes(moves) if moves[rows[-1], 5] == 0]
-    return max(first, key=lambda rows: float(np.linalg.norm(np.diff(moves[rows, :2], axis=0), axis=1).sum()))
-
-
-class Stroke(NamedTuple):
-    """A line laid in one go, corner by corner: places in plan (n, 2) [m], distance along it (n,) [m], time (n,) [s] and
-    what was extruded till then (n,), as in Track [s]."""
-
-    points: np.ndarray
-    distance: np.ndarray
-    time: np.ndarray
-    extruding: np.ndarray
-
-    @property
-    def fed(self) -> np.ndarray:
-        """Per length of each leg, shape (n - 1,) [s/m]: times the nozzle's rate, the section that is laid."""
-        return np.diff(self.extruding) / np.diff(self.distance)
-
-
-@dataclass(frozen=True)
-class Track:
-    """A toolpath in time: knots between which position and extruded time are linear.
-
-    time: (n,) [s]; position: (n, 3), the nozzle exit [m]; extruding: (n,), time that the nozzle's flow would have taken
-    for what was extruded up to the knot [s]; layer: (n - 1,), the layer of each interval; measured: the knots of what
-    beads are measured along, which is the first layer, or of G-code its longest stroke.
-    """
-
-    time: np.ndarray
-    position: np.ndarray
-    extruding: np.ndarray
-    layer: np.ndarray
-    measured: np.ndarray
-
-    @classmethod
-    def of(cls, path: Toolpath, floor: float, standoff: float) -> "Track":
-        """Lay the path out in time, the nozzle exit `standoff` above the floor plus one `layer_height` a layer."""
-        if path.moves is not None:
-            moves = path.moves.array
-            time, extruding = np.cumsum(moves[:, 3]), np.cumsum(moves[:, 3] * moves[:, 4])
-            return cls(time, moves[:, :3] + [0.0, 0.0, floor], extruding, moves[1:, 5].astype(int), longest(moves))
-        knots: list[tuple[float, float, float, float, float]] = []
-        layers: list[int] = []
-        time = extruding = 0.0
-        for layer in range(path.layers):
-            z = floor + standoff + layer * (path.layer_height or 0.0)
-            corners, legs, flows = path.layer(backwards=layer % 2 == 1 and path.kind != "ring")
-            knots.append((time, *corners[0], z, extruding))
-            for corner, leg, flow in zip(corners[1:], legs, flows, strict=True):
-                time, extruding = time + leg, extruding + flow * leg
-                knots.append((time, *corner, z, extruding))
-            layers += [layer] * (len(legs) + 1)
-            if layer < path.layers - 1 and path.layer_height is not None:
-                time += max(path.pause, path.layer_height / path.speed if path.speed else 0.0)
-        table = np.array(knots)
-        measured = np.arange(len(path.layer(backwards=False)[0]))
-        return cls(table[:, 0], table[:, 1:4], table[:, 4], np.array(layers[:-1]), measured)
-
-    @cached_property
-    def stroke(self) -> "Stroke":
-        """What beads are measured along."""
-        rows = self.measured
-        ways = np.linalg.norm(np.diff(self.position[rows, :2], axis=0), axis=1)
-        rows = rows[np.concatenate([[True], ways > 0])]
-        distance = np.concatenate([[0.0], np.cumsum(ways[ways > 0])])
-        return Stroke(self.position[rows, :2], distance, self.time[rows], self.extruding[rows])
-
-    @property
-    def end(self) -> float:
-        """Time at which extrusion ends [s]."""
-        return float(self.time[-1])
-
-    def at(self, time) -> np.ndarray:
-        """Position of the nozzle exit, shape (..., 3) [m]; it rests at both ends of the track."""
-        return np.stack([np.interp(time, self.time, self.position[:, axis]) for axis in range(3)], axis=-1)
-
-    def velocity(self, time) -> np.ndarray:
-        """Velocity of the nozzle while it extrudes, shape (..., 3) [m/s]; 0 during pauses and at the ends."""
-        i = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
-        step = np.maximum(np.diff(self.time), 1e-300)[i][..., None]
-        moving = (np.diff(self.extruding)[i] > 0)[..., None] & (np.asarray(time) < self.end)[..., None]
-        return np.where(moving, np.diff(self.position, axis=0)[i] / step, 0.0)
-
-    def extruded(self, time) -> np.ndarray:
-        """Time that the nozzle's flow would have taken for what was extruded up to `time` [s]."""
-        return np.interp(time, self.time, self.extruding)
-
-    def release_time(self, extruding) -> np.ndarray:
-        """The first time at which this much was extruded [s]: the inverse of `extruded`."""
-        i = np.clip(np.searchsorted(self.extruding, extruding, side="left"), 1, len(self.time) - 1)
-        return self.time[i] - (self.extruding[i] - extruding) / np.maximum(self.flow_in[i - 1], 1e-300)
-
-    @cached_property
-    def flow_in(self) -> np.ndarray:
-        """Flow in each interval over the nozzle's, shape (n - 1,) [-]."""
-        return np.diff(self.extruding) / np.maximum(np.diff(self.time), 1e-300)
-
-    @cached_property
-    def speed_in(self) -> np.ndarray:
-        """Of the nozzle in each interval, shape (n - 1,) [m/s]."""
-        return np.linalg.norm(np.diff(self.position, axis=0), axis=1) / np.maximum(np.diff(self.time), 1e-300)
-
-    def flow(self, time) -> np.ndarray:
-        """Flow over the nozzle's at `time` [-]; 0 before and after."""
-        i = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
-        return np.where((np.asarray(time) < self.end) & (np.asarray(time) >= 0.0), self.flow_in[i], 0.0)
-
-    def layer_at(self, time) -> np.ndarray:
-        """Index of the layer being laid at `time`."""
-        return self.layer[np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.layer) - 1)]
+    flat = np.linalg.norm(np.diff(moves[:, :2], axis=0), axis=1) > 0
+    if not (flat & (moves[1:, 4] > 0) & (moves[1:, 5] == 0)).any():
+        raise ValueError("moves: none of layer 0 lays anything")

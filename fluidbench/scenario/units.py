@@ -38,7 +38,7 @@ UNITS: dict[str, tuple[float, Dimension]] = {
 PREFIXED = ("m", "g", "s", "Hz", "l", "L", "N", "Pa", "bar", "P", "St", "J", "t")
 PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6, "G": 1e9}
 AMOUNT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*\*\s*|\s*)(.*?)\s*", re.DOTALL)
-FACTOR = re.compile(r"([A-Za-zµμ%]+)(?:(?:\^|\*\*)?([+-]?\d+(?:\.\d+)?))?|([²³])")
+FACTOR = re.compile(r"([A-Za-zµμ%]+)(?:\^?([+-]?\d+(?:\.\d+)?))?")
 RAISED = str.maketrans({"²": "^2", "³": "^3", "·": " ", "×": " "})
 
 
@@ -94,3 +94,12 @@ def in_si(value: Any, wanted: str) -> Any:
     if not alike:
         raise ValueError(f"{quoted(value)} is of another kind than {wanted or 'a plain number'}")
     return float(f"{float(found[1]) * size:.15g}")  # the same number as 0.02, whatever 20 * 1e-3 is rounded to
+
+
+def amount(value: Any, wanted: str) -> float:
+    """The same as a number; raises ValueError for what is none, too."""
+    found = in_si(value, wanted)
+    try:
+        return float(found)
+    except (TypeError, ValueError):
+        raise ValueError(f"{quoted(value)} is no number, with its unit or in {wanted or 'none'}") from None

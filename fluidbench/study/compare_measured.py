@@ -14,24 +14,27 @@ from ..scenario.measured import ALONG, Measured, unit_of
 SCALES = {"m": (1e3, "mm"), "m^2": (1e6, "mm²"), "": (1.0, "")}
 
 
-def against_measured(results: Sequence[Run], measured: Sequence[Measured]) -> Table | None:
+Values = dict[str, list[float]]  # of each run by its label, in the order of what was measured
+
+
+def values_of(results: Sequence[Run], measured: Sequence[Measured]) -> Values:
+    """What every completed run has of what was measured."""
+    return {run.label: computed(run, measured) for run in results if run.ok and run.record.repeat == 0 and measured}
+
+
+def against_measured(values: Values, measured: Sequence[Measured]) -> Table | None:
     """Each measured number, and of each method its value with the error in per cent and over the uncertainty."""
-    done = [run for run in results if run.ok and run.record.repeat == 0]
-    if not measured or not done:
+    if not values:
         return None
-    table = Table("Against measurements", ["", "measured", *[run.label for run in done]])
+    table = Table("Against measurements", ["", "measured", *values])
     missing: list[str] = []
-    for one in measured:
+    for i, one in enumerate(measured):
         scale, unit = SCALES[unit_of(one.key)]
         given = number(scale * one.value)
         given += f" ± {number(scale * one.uncertainty)}" if one.uncertainty is not None else ""
-        row = [f"{one.words} [{unit}]" if unit else one.words, given]
-        for run in done:
-            value = computed(run, one)
-            row.append(_cell(value, one, scale))
-            if math.isnan(value):
-                missing.append(f"{run.label} has no {one.words}")
-        table.rows.append(row)
+        cells = [_cell(own[i], one, scale) for own in values.values()]
+        table.rows.append([f"{one.words} [{unit}]" if unit else one.words, given, *cells])
+        missing += [f"{label} has no {one.words}" for label, own in values.items() if math.isnan(own[i])]
     words = "error in per cent, and over the uncertainty (u) where one is given"
     sources = dict.fromkeys(one.source for one in measured if one.source)
     note = [words, *(f"measured: {line}" for line in sources), *(f"not compared: {line}" for line in missing)]
@@ -46,22 +49,20 @@ def _cell(value: float, one: Measured, scale: float) -> str:
     return f"{number(scale * value)} ({', '.join(parts)})" if parts else number(scale * value)
 
 
-def measured_plot(results: Sequence[Run], measured: Sequence[Measured]) -> list[Plot]:
+def measured_plot(values: Values, measured: Sequence[Measured]) -> list[Plot]:
     """Computed over measured, a point a method, with the uncertainty about 1."""
-    done = [run for run in results if run.ok and run.record.repeat == 0]
-    told = [one for one in measured if one.value]
-    if not done or not told:
+    told = [i for i, one in enumerate(measured) if one.value]
+    if not values or not told:
         return []
     plot = Plot("measured", "computed over measured", "", "computed / measured")
-    names = [one.words.replace(" at ", "<br>at ") for one in told]
-    spread = [abs((one.uncertainty or 0.0) / one.value) for one in told]
-    plot.traces.append(Trace("measured", names, [1.0] * len(told), "points", "#000000", spread))
-    for run in done:
-        ratio = [computed(run, one) / one.value for one in told]
-        found = [(name, value) for name, value in zip(names, ratio, strict=True) if not math.isnan(value)]
-        if found:
-            xs, ys = zip(*found, strict=True)
-            plot.traces.append(Trace(run.label, list(xs), list(ys), "points", colour(run.label)))
+    names = {i: measured[i].words.replace(" at ", "<br>at ") for i in told}
+    spread = [abs((measured[i].uncertainty or 0.0) / measured[i].value) for i in told]
+    plot.traces.append(Trace("measured", list(names.values()), [1.0] * len(told), "points", "#000000", spread))
+    for label, own in values.items():
+        there = [i for i in told if not math.isnan(own[i])]
+        ratios = [own[i] / measured[i].value for i in there]
+        if there:
+            plot.traces.append(Trace(label, [names[i] for i in there], ratios, "points", colour(label)))
     return [plot]
 
 

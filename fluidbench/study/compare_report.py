@@ -9,7 +9,7 @@ from ..method.verdict import Verdict
 from ..report.report import Report, machine_of, record_link
 from ..runs.record import Run
 from ..scenario.measured import Measured
-from .compare_measured import against_measured, measured_plot
+from .compare_measured import against_measured, measured_plot, values_of
 from .compare_plots import plots
 from .compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
 from .compare_views import views
@@ -28,7 +28,8 @@ def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measur
     any other verb in the same folder has files of its own, under its name."""
     import pandas as pd
 
-    beside = against_measured(runs, measured)
+    values = values_of(runs, measured)
+    beside = against_measured(values, measured)
     made = (fidelity(runs), successes(runs), beside, against_reference(runs), costs(runs), backends(runs))
     first = next((run for run in runs if run.record.input is not None), None)
     expected = first.scenario.warnings() if first else []
@@ -40,7 +41,7 @@ def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measur
         [],
         [table for table in made if table is not None],
         pd.DataFrame([{**run.record.row(), "reused": run.reused} for run in runs]),
-        [*measured_plot(runs, measured), *plots(runs, measured)],
+        [*measured_plot(values, measured), *plots(runs, measured)],
         {"records": [record_link(run, root, f"{run.label} #{run.record.repeat + 1}") for run in runs]},
         machine_of(runs),
         alarms=[*failed_prints(runs), *met],

@@ -20,34 +20,21 @@ def _track(scenario: Scenario) -> Track:
     return scenario.track
 
 
-def strokes(track: Track) -> list[slice]:
-    """Intervals of the track that extrude one after the other in one layer."""
-    fed, layer = track.flow_in > 0, track.layer
-    starts = np.flatnonzero(fed & ~(np.roll(fed, 1) & (np.roll(layer, 1) == layer) & (np.arange(len(fed)) > 0)))
-    found = []
-    for start in starts:
-        stop = start + 1
-        while stop < len(fed) and fed[stop] and layer[stop] == layer[start]:
-            stop += 1
-        found.append(slice(int(start), stop))
-    return found
-
-
 def route(scenario: Scenario) -> tuple[list[Table], list[str]]:
     """(tables of the strokes and of the whole, remarks)."""
     track, nozzle, path = _track(scenario), scenario.nozzle, scenario.toolpath
     assert nozzle is not None and path is not None
     ways = track.speed_in * np.diff(track.time)
-    laid = strokes(track)
+    laid = track.strokes
     head = ["stroke", "layer", "height [mm]", "length [mm]", "time [s]", "speed [mm/s]", "section [mm²]"]
     table = Table("What is laid", head)
-    for i, part in enumerate(laid[:MOST_ROWS]):
-        way, time = float(ways[part].sum()), float(np.diff(track.time)[part].sum())
-        volume = nozzle.rate * float(track.extruding[part.stop] - track.extruding[part.start])
-        height = track.position[part.stop, 2] - scenario.domain.lower[2]
+    for i, (first, last) in enumerate((rows[0], rows[-1]) for rows in laid[:MOST_ROWS]):
+        way, time = float(ways[first:last].sum()), float(track.time[last] - track.time[first])
+        volume = nozzle.rate * float(track.extruding[last] - track.extruding[first])
+        height = track.position[last, 2] - scenario.domain.lower[2]
         section = number(1e6 * volume / way) if way > 0 else "-"
         numbers = (1e3 * height, 1e3 * way, time, 1e3 * way / time)
-        table.rows.append([str(i + 1), str(track.layer[part.start] + 1), *map(number, numbers), section])
+        table.rows.append([str(i + 1), str(track.layer[first] + 1), *map(number, numbers), section])
     fed = track.flow_in > 0
     whole = Table("The whole path", ["", "value", "unit"])
     spans = (f"{number(1e3 * low)} .. {number(1e3 * high)}" for low, high in _spans(track))
@@ -89,9 +76,8 @@ def draw(scenario: Scenario, folder: Path) -> Path:
     where, times = 1e3 * track.position, track.time
     for axes, up in ((plan, 1), (side, 2)):
         axes.plot(where[:, 0], where[:, up], ":", color="#888888", lw=0.9, label="travel")
-        for part in strokes(track):
-            rows = slice(part.start, part.stop + 1)
-            layer = int(track.layer[part.start])
+        for rows in track.strokes:
+            layer = int(track.layer[rows[0]])
             axes.plot(where[rows, 0], where[rows, up], color=COLOURS[layer % len(COLOURS)], lw=2.2 if up == 1 else 1.6)
     plan.plot(*where[0, :2], "o", color="black", mfc="none", label="start")
     plan.plot(*where[-1, :2], "x", color="black", label="end")

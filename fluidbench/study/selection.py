@@ -147,7 +147,7 @@ def assess(
     scenario: Scenario, methods: Sequence[str], runs: Sequence[Run], measured: Sequence[Measured] = ()
 ) -> Selection:
     """Errors of all candidates from finished runs, against what was `measured` where that is known."""
-    told = {one.key: one.value for one in measured if one.place is None and one.value}
+    told = averages(measured)
     result = Selection([], trust_of(scenario, methods), {}, list(runs))
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
@@ -169,13 +169,14 @@ def assess(
             result.notes.append(f"{run.method} {still}: not at rest at the end: {', '.join(restless)}")
     found = {key for run in runs if run.ok for key in lengths_of(run.record)}
     for one in measured:
-        judged = one.place is None and one.value and one.key in found
-        spread = f", known to {one.uncertainty / abs(one.value):.1%}" if judged and one.uncertainty is not None else ""
-        result.notes.append(
-            f"{one.words}: errors are from the measured {one.value:.4g}{spread}"
-            if judged
-            else f"{one.words}: measured, but no length that is judged here"
-        )
+        if one.place is not None or one.key not in told or one.key not in found:
+            result.notes.append(f"{one.words}: measured, but no length that is judged here")
+    for key in told.keys() & found:
+        own = [one for one in measured if one.key == key and one.place is None]
+        doubt = max((one.uncertainty or 0.0) / abs(told[key]) for one in own)
+        spread = f", known to {doubt:.1%}" if doubt else ""
+        mean = f" (mean of {len(own)})" if len(own) > 1 else ""
+        result.notes.append(f"{own[0].words}: errors are from the measured {told[key]:.4g}{mean}{spread}")
     consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
     if not trusted:
         result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
@@ -188,6 +189,15 @@ def assess(
             result.candidates.append(_candidate(run, fits[run.method], consensus, told))
     result.notes += [_unconverged(result, method) for method in fits if not result.converges(method)]
     return result
+
+
+def averages(measured: Sequence[Measured]) -> dict[str, float]:
+    """Key of a length -> what was measured of it along the whole path, the mean of several; 0 is no length."""
+    values: dict[str, list[float]] = {}
+    for one in measured:
+        if one.place is None:
+            values.setdefault(one.key, []).append(one.value)
+    return {key: mean for key, own in values.items() if (mean := float(np.mean(own)))}
 
 
 def _unconverged(result: Selection, method: str) -> str:

@@ -11,7 +11,8 @@ from ..errors import UserError, quoted, suggestion
 from ..registry import get_method
 from ..scenario import Scenario
 from ..scenario.library import find, load
-from ..scenario.units import in_si
+from ..scenario.material import Material
+from ..scenario.units import amount, in_si
 from .estimate import estimate
 from .workplace import methods_of
 
@@ -77,8 +78,8 @@ def pair(key: str, answer: str, units: tuple[str, str]) -> tuple[float, float]:
 
 def _amount(text: str, unit: str) -> float:
     """A number with a unit, or in millimetres."""
-    found = in_si(text, unit)
-    return float(found) if isinstance(found, float) or not unit else 1e-3 * float(found)
+    plain = bool(unit) and not isinstance(in_si(text, unit), float)
+    return (1e-3 if plain else 1.0) * amount(text, unit)
 
 
 def check(key: str, answer: str) -> None:
@@ -104,14 +105,14 @@ def scenario_text(answers: dict[str, str], name: str) -> str:
     travel, exit_speed = pair("speeds", answers["speeds"], ("m/s", "m/s"))
     layers, length = pair("layers", answers["layers"], ("", "m"))
     across = ACROSS[chosen("goal", answers["goal"], ACROSS)]
-    block = material_of(material)
+    shipped = load(MATERIALS[material]).material
+    swell = 1.0 if shipped.expansion is None else shipped.expansion.ratio ** (1.0 / 3.0)
     time = (layers * length + (layers - 1) * gap) / travel
-    swell = _swell(block)
     pressed = travel / exit_speed * (gap / bore) ** 2 < 1.0
     return _template().render(
         name=name,
         material=material,
-        block=block,
+        block=material_of(material),
         bore=bore,
         gap=gap,
         rise=gap,
@@ -124,7 +125,7 @@ def scenario_text(answers: dict[str, str], name: str) -> str:
         swollen=swell > 1.0,
         spacing=bore * swell / across,
         time=time,
-        duration=_upwards((1.0 + REST) * time + _latest(block)),
+        duration=_upwards((1.0 + REST) * time + _latest(shipped)),
         side=BESIDE * bore * swell,
         top=gap + (layers - 1) * gap + ABOVE * bore * swell,
         speed_ratio=travel / exit_speed,
@@ -172,20 +173,7 @@ def material_of(name: str) -> str:
     return found[0].rstrip() + "\n"
 
 
-def _value(block: str, key: str) -> float:
-    found = re.search(rf"^{key} = ([\d.e+-]+)", block, re.MULTILINE)
-    return float(found[1]) if found else 0.0
-
-
-def _swell(block: str) -> float:
-    """How much longer lengths become by expansion."""
-    return max(_value(block, "ratio"), 1.0) ** (1.0 / 3.0)
-
-
-def _latest(block: str) -> float:
-    """How long the last of it expands and cures [s]."""
-    if "[material." not in block:
-        return 0.0
-    return (
-        _value(block, "delay") + 5.0 * _value(block, "time") + (3.0 / _value(block, "rate") if "rate" in block else 0.0)
-    )
+def _latest(material: Material) -> float:
+    """How long the last of it expands and cures, to 95 % [s]."""
+    growing = 0.0 if material.expansion is None else material.expansion.last_event + 3.0 * material.expansion.time
+    return max(growing, 0.0 if material.cure is None else material.cure.age_at(0.95) + material.cure.jitter)

@@ -2,13 +2,12 @@
 
 import math
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from pydantic import Field
 
-from fluidbench.method.contract import Config, Economy
+from fluidbench.method.contract import Economy
 from fluidbench.method.features import Feature
 from fluidbench.method.target import BACKENDS
 from fluidbench.method.timestep import Bound
@@ -16,7 +15,6 @@ from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
-from fluidbench.scenario.material import Material
 
 from .. import aging
 from ..backends import backend_of
@@ -28,67 +26,18 @@ from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
 from ..smoothing import wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
-from ..viscosity import WORTH, ImplicitViscosity, Scheme, Tolerance, accuracy, decided
+from ..viscosity import WORTH, ImplicitViscosity, accuracy, decided
 from . import kernels_warp as kernels
+from .config import ConfigSPH
 from .particle import Smoothing
-
-NonNegative = Annotated[float, Field(ge=0)]
-Ratio = Annotated[float, Field(ge=1.0, le=3.0)]
-
-
-class ConfigSPH(Config):
-    smoothing_ratio: Ratio = Field(1.8, description="smoothing length h over spacing, for liquids")
-    smoothing_ratio_solid: Ratio = Field(1.3, description="the same for materials with shear stiffness")
-    smoothing_ratio_foam: Ratio = Field(
-        1.5, description="the same for those that expand, whose particles lie in no order"
-    )
-    cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
-    viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
-    viscosity: Scheme = Field(
-        "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
-    )
-    viscous_tolerance: Tolerance = 1e-4
-    force_number: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="dt / sqrt(h / |g|)")
-    density_diffusion: NonNegative = Field(0.1, description="delta of delta-SPH")
-    artificial_viscosity: NonNegative = Field(0.01, description="alpha for liquids")
-    artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for solids and pastes")
-    artificial_viscosity_viscoelastic: NonNegative = Field(0.3, description="alpha for liquids that relax")
-    hourglass: NonNegative = Field(
-        2.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows; 0 in what expands"
-    )
-    shifting: NonNegative = Field(4.0, description="shift out of a crowd, over strain and h^2 times its gradient")
-    density_feedback: NonNegative = Field(
-        0.05, description="rate, in c / h, at which integrated density follows the summed one, where matter flows"
-    )
-    density_tolerance: NonNegative = Field(0.03, description="gap between the two that is left alone, over the density")
-    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
-
-    def alpha(self, material: Material) -> float:
-        if material.relaxation_time is not None:
-            return self.artificial_viscosity_viscoelastic
-        return self.artificial_viscosity_solid if material.elastic else self.artificial_viscosity
-
-    def zeta(self, material: Material) -> float:
-        """Of the hourglass control. It remembers where neighbours were: in what expands, children have others."""
-        return self.hourglass if material.expansion is None else 0.0
-
-    def smoothing_key(self, material: Material) -> str:
-        if not material.elastic:
-            return "smoothing_ratio"
-        return "smoothing_ratio_solid" if material.expansion is None else "smoothing_ratio_foam"
-
-    def smoothing(self, material: Material) -> float:
-        """Smoothing length over spacing."""
-        return float(getattr(self, self.smoothing_key(material)))
-
 
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 SPRAYED = 3.0  # particles across what is fed below which a paste that lands is sprayed: seen at 2.4, not at 3.4
-FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 CLOSE = 0.9  # distance below which particles are moved apart, in spacings
 BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
 HOURGLASS_SAFETY = 0.8  # for the stress and the pressure act on the same waves
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
+FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 
 
 def crowding(r: float, d: float, h: float) -> float:
@@ -229,7 +178,7 @@ class SolverSPH(Solver):
             pool.add_field("off_linear", wp.vec3)
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
-            self.steady = wp.zeros(pool.size if scene.changes else 1, dtype=float)  # growth of what does not grow
+            self.growth = pool.growth if scene.grows else wp.zeros(pool.size if scene.changes else 1, dtype=float)
             self.matter = wp.zeros(pool.size * kernels.MATTER // 4, dtype=wp.vec4)
             self.state = wp.zeros(pool.size * kernels.STATE[scene.elastic, scene.changes] // 4, dtype=wp.vec4)
             self.new_density = wp.zeros(pool.size, dtype=float)
@@ -261,7 +210,7 @@ class SolverSPH(Solver):
             data.new_density = self.new_density
         self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
         self.straining.shift = self.shift
-        self.straining.growth = pool.growth if scene.grows else self.steady
+        self.straining.growth = self.growth
         for name, array in zip(STRAINS, self._strains(), strict=True):
             setattr(self.straining, name, array)
         self.forcing.forces, self.forcing.acceleration = scene.force, self.acceleration

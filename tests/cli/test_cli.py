@@ -94,6 +94,21 @@ def test_two_backends_are_two_rows_with_cost_ratio_and_the_same_lengths(tmp_path
         assert abs(width.iloc[1] - width.iloc[0]) < table["resolution_m"].iloc[0]
 
 
+def test_measurements_stand_beside_runs_that_do_not_depend_on_them(tmp_path):
+    (tmp_path / "m.csv").write_text(
+        "quantity, place, value, uncertainty\nwidth, , 16 mm, 1 mm\nwidth, 45 mm, 16 mm, 1 mm\n"
+    )
+    arguments = ["compare", "line_bead", *TINY, "--solvers", "mpm", "--out", str(tmp_path / "out")]
+    plain = fluidbench(*arguments)
+    told = fluidbench(*arguments, "--measured", str(tmp_path / "m.csv"))
+    assert plain.returncode == told.returncode == 0, told.stdout + told.stderr
+    assert "Against measurements" not in plain.stdout and "reused" in told.stderr
+    rows = [line for line in told.stdout.splitlines() if "16 ± 1" in line]
+    assert len(rows) == 2 and " u)" in rows[0] and "-" in rows[1]  # its path is shorter
+    assert "not compared: mpm has no bead width at 45 mm" in told.stdout
+    assert (tmp_path / "out" / "measured.png").exists()
+
+
 def test_resume_after_a_kill(tmp_path):
     """kill -9 in the middle of a run: the finished run is kept, the half-finished one is run again."""
     command = [sys.executable, "-m", "fluidbench", "compare", "line_bead", *TINY, "--out", str(tmp_path)]

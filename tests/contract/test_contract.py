@@ -205,3 +205,26 @@ def test_a_clamped_body_keeps_its_velocity(method):
     moved = after["position"][clamped] - before["position"][clamped]
     assert np.allclose(moved, [0.1 * sim.now, 0.0, 0.0], atol=1e-5)
     assert np.allclose(after["velocity"][clamped], [0.1, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("method", NATIVE)
+def test_a_path_with_travel_leaves_beads_where_it_extrudes_and_nothing_between(method, tmp_path):
+    """Two strokes 40 mm apart in plan, the second with half the flow, as G-code; 3 particles across."""
+    (tmp_path / "two.gcode").write_text(
+        "M83\nG0 F6000 X0 Y0 Z4\nG1 F3000 X30 E30\nG1 E-2\nG0 Z8\nG0 X0 Y40\nG0 Z4\nG1 E2\nG1 F3000 X30 E15\n"
+    )
+    paste = {"density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "yield_stress": 60.0}
+    path = {"kind": "gcode", "file": str(tmp_path / "two.gcode"), "filament": 6e-3}
+    nozzle = {"diameter": 6e-3}
+    two = scenario(material=paste, nozzle=nozzle, toolpath=path, bodies=[], spacing=2e-3, domain=None, duration=2.6)
+    sim = Simulation(two, method)
+    assert drive(sim).verdict == Verdict.COMPLETED
+    end = sim.pool.snapshot()
+    x, laid = end["position"], float(end["volume"].sum())
+    disc = 2e-3 * np.pi * 9e-6  # one may be early, or hang on to what is in the nozzle
+    assert laid == pytest.approx(45e-3 * np.pi * 9e-6, abs=disc)
+    first, second = x[:, 1] < 0.02, x[:, 1] >= 0.02
+    assert end["volume"][second].sum() == pytest.approx(15e-3 * np.pi * 9e-6, abs=1.01 * disc)
+    for own, y in ((first, 0.0), (second, 0.04)):
+        assert np.abs(x[own, 1] - y).max() < 8e-3
+        assert x[own, 0].min() > -8e-3 and x[own, 0].max() < 38e-3

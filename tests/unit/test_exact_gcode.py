@@ -10,7 +10,6 @@ from fluidbench.errors import UserError
 from fluidbench.scenario import gcode
 from fluidbench.scenario.library import define, load
 from fluidbench.scenario.stream import Stream
-from fluidbench.scenario.toolpath import strokes
 from fluidbench.study.route import draw, route
 
 PASTE = {"density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "yield_stress": 60.0}
@@ -123,14 +122,14 @@ def test_a_scenario_takes_layers_heights_speeds_and_flow_from_the_file(tmp_path)
     s = printed(tmp_path)
     track, path = s.track, s.toolpath
     assert (path.layers, path.layer_height, s.nozzle.standoff) == (2, pytest.approx(2e-3), pytest.approx(2e-3))
-    assert path.file == "part.gcode" and not path.repeats
+    assert path.file == "part.gcode" and not track.repeats
     laid = 1e-9 * 2.0 * (50 + 30 + 50)  # 2 mm^2 over the lengths in mm
     assert s.nozzle.rate * track.extruding[-1] == pytest.approx(laid, rel=1e-5)
     assert Stream(s).particles * Stream(s).volume == pytest.approx(laid, rel=2e-3)
     assert path.speed == pytest.approx(1 / 60) and s.reference_speed >= 8 / 60
     assert track.end == pytest.approx(0.13 * 60 + math.hypot(50, 2) / 8000 * 60)
     assert s.duration == pytest.approx(1.1 * track.end)
-    assert [rows.tolist() for rows in strokes(path.moves.array)] == [[0, 1, 2], [3, 4]]
+    assert [rows.tolist() for rows in track.strokes] == [[0, 1, 2], [3, 4]]
     assert track.stroke.points.tolist() == pytest.approx(np.array([[0.01, 0.01], [0.06, 0.01], [0.06, 0.04]]))
     assert track.layer.tolist() == [0, 0, 0, 1]
     assert s.domain.lower[2] == 0 and all(s.domain.contains(track.position))
@@ -192,8 +191,8 @@ def test_what_contradicts_the_file_is_refused(tmp_path, change, words):
 
 def test_a_wall_that_a_slicer_repeats_is_a_tower(tmp_path):
     text = "M83\nG0 F6000 X0 Y0 Z1\nG1 F1200 X40 E20\nG0 Z2\nG1 X0 E20\nG0 Z3\nG1 X40 E20\n"
-    assert printed(tmp_path, text).toolpath.repeats
-    assert not printed(tmp_path, text + "G0 Y5\nG1 X0 E20\n").toolpath.repeats
+    assert printed(tmp_path, text).track.repeats
+    assert not printed(tmp_path, text + "G0 Y5\nG1 X0 E20\n").track.repeats
 
 
 def test_the_path_is_told_and_drawn(tmp_path):

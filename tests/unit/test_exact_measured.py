@@ -7,8 +7,9 @@ from fluidbench.errors import UserError
 from fluidbench.measure.beside import computed
 from fluidbench.runs.job import Job
 from fluidbench.scenario.library import load
-from fluidbench.scenario.measured import Measured, read
-from fluidbench.study.compare_measured import against_measured, measured_plot, points_along
+from fluidbench.scenario.measured import OF_ALL, Measured, read
+from fluidbench.study.compare_measured import against_measured, measured_plot, points_along, values_of
+from fluidbench.study.lengths import LENGTHS
 from fluidbench.study.selection import assess
 
 from ..conftest import bead
@@ -86,14 +87,16 @@ def test_each_method_has_its_error_in_per_cent_and_over_the_uncertainty():
         Measured(quantity="width", value=0.016, uncertainty=4e-4, source="us"),
         Measured(quantity="area", value=1e-4),
     ]
-    table = against_measured([*runs, finished("pbd", "diverged")], rows)
+    values = values_of([*runs, finished("pbd", "diverged"), finished("mpm", repeat=1)], rows)
+    table = against_measured(values, rows)
     assert table.head == ["", "measured", "mpm", "sph"] and table.rows == [
         ["bead width [mm]", "16 ± 0.4", "16.8 (+5.0 %, +2.0 u)", "-"],
         ["bead area [mm²]", "100", "110 (+10.0 %)", "-"],
     ]
     assert "measured: us" in table.note and "not compared: sph has no bead width" in table.note
-    assert against_measured(runs, []) is None and against_measured([finished("pbd", "diverged")], rows) is None
-    plot = measured_plot(runs, rows)[0]
+    for other in (values_of(runs, []), values_of([finished("pbd", "diverged")], rows)):
+        assert against_measured(other, rows) is None and measured_plot(other, rows) == []
+    plot = measured_plot(values, rows)[0]
     assert plot.traces[0].spread == pytest.approx([0.025, 0.0]) and plot.traces[1].y == pytest.approx([1.05, 1.1])
     assert len(plot.traces) == 2  # nothing of sph
 
@@ -113,7 +116,7 @@ def test_places_along_the_path_are_read_off_the_section_there(monkeypatch):
         def frame(self):
             return {}
 
-    at = [computed(Ended(), Measured(quantity="width", value=1.0, place=place)) for place in (0.0, 0.025, 0.2)]
+    at = computed(Ended(), [Measured(quantity="width", value=1.0, place=place) for place in (0.0, 0.025, 0.2)])
     assert at[:2] == pytest.approx([0.010, 0.0125]) and np.isnan(at[2])
     rows = [
         Measured(quantity="width", value=0.016, place=0.045, uncertainty=1e-3),
@@ -134,5 +137,13 @@ def test_select_counts_errors_from_what_was_measured():
     assert max(c.error for c in free.candidates) < 1e-9
     assert [c.error for c in told.candidates] == pytest.approx([0.5] * 3)
     assert any("bead width: errors are from the measured 0.01, known to 5.0%" in note for note in told.notes)
+    two = [Measured(quantity="width", value=value) for value in (0.010, 0.014)]
+    mean = assess(bead(), ["mpm"], runs, two)
+    assert [c.error for c in mean.candidates] == pytest.approx([0.25] * 3)
+    assert any("the measured 0.012 (mean of 2)" in note for note in mean.notes)
     lost = assess(bead(), ["mpm"], runs, [Measured(quantity="slump", value=0.3)])
     assert any("slump: measured, but no length that is judged here" in note for note in lost.notes)
+
+
+def test_every_length_that_is_judged_can_be_measured():
+    assert set(LENGTHS) <= set(OF_ALL)

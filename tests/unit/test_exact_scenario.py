@@ -44,6 +44,7 @@ def test_the_reference_speed_of_a_print_and_of_foam():
         nozzle={"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.110},
     )
     assert tall.reference_speed == pytest.approx(math.sqrt(20.0 * 0.110))  # a paste stands: only the gap is fallen
+    assert tall.falling_speed() == pytest.approx(math.sqrt(20.0 * 0.115))  # what falls off a tower may be that fast
     runny = tall.replace(material={"density": 1000.0, "viscosity": 1.0})
     assert runny.reference_speed == pytest.approx(math.sqrt(20.0 * 0.115))  # from the highest nozzle to the floor
     foam = {"density": 1.0, "expansion": {"ratio": 61.0, "time": 0.5}}

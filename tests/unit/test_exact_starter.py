@@ -74,6 +74,15 @@ def test_what_cannot_be_understood_is_said_with_an_example(key, answer, words):
         scenario_text(PLAIN | {key: answer}, "a.toml")
 
 
+@pytest.mark.parametrize(("method", "weight"), [("mpm", 16.0), ("sph", 6.0), ("pbd", 1.0)])
+def test_an_implicit_step_is_estimated_at_what_makes_it_worth_while(method, weight):
+    """PBD's rate is that of steps which solve for viscosity."""
+    solver = get_method(method)
+    for scheme, factor in (("explicit", 1.0), ("implicit", weight)):
+        config = solver.Config() if method == "pbd" else solver.Config(viscosity=scheme)
+        assert solver.weight_of_a_step(load("melt_line"), config) == factor
+
+
 def test_two_numbers_in_si():
     assert pair("nozzle", "1 in, 2 m", ("m", "m")) == (0.0254, 2.0)
 

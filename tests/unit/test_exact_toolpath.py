@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fluidbench.scenario.toolpath import Toolpath, Track
+from fluidbench.scenario.toolpath import Toolpath
+from fluidbench.scenario.track import Track
 
 # An L of two legs, 3 m and 4 m, at 2 m/s; 1 s of pause after the first of two layers, 0.5 m high.
 ELL = Toolpath(kind="polyline", points=((1, 1), (4, 1), (4, 5)), speed=2.0, layers=2, layer_height=0.5, pause=1.0)
@@ -35,24 +36,26 @@ def test_places_between_knots_and_beyond_both_ends():
     assert TRACK.at(np.array([0.75, 2.5])).tolist() == [[2.5, 1, 10.25], [4, 3, 10.25]]
 
 
-@pytest.mark.parametrize(
-    ("time", "velocity"),
-    [
-        (0.0, (2, 0)),
-        (1.4999, (2, 0)),
-        (1.5, (0, 2)),
-        (3.4999, (0, 2)),
-        (3.5, (0, 0)),
-        (4.4999, (0, 0)),
-        (4.5, (0, -2)),
-        (6.5, (-2, 0)),
-        (7.9999, (-2, 0)),
-        (8.0, (0, 0)),
-        (9.0, (0, 0)),
-    ],
-)
-def test_velocity_changes_at_corners_and_is_zero_in_pauses_and_after_the_end(time, velocity):
-    assert TRACK.velocity(time) == pytest.approx([*velocity, 0.0])
+def test_velocity_from_corner_to_corner_and_in_the_pause():
+    assert TRACK.velocity_in.tolist() == [[2, 0, 0], [0, 2, 0], [0, 0, 0.5], [0, -2, 0], [-2, 0, 0]]
+    assert TRACK.speed_in.tolist() == [2, 2, 0.5, 2, 2] and TRACK.flow_in.tolist() == [1, 1, 0, 1, 1]
+
+
+def test_what_is_laid_in_one_go_stroke_by_stroke():
+    """There and back over the same corners; the first is what beads are measured along."""
+    assert [rows.tolist() for rows in TRACK.strokes] == [[0, 1, 2], [3, 4, 5]] and TRACK.repeats
+    assert TRACK.stroke.points.tolist() == [[1, 1], [4, 1], [4, 5]] and TRACK.stroke.distance.tolist() == [0, 3, 7]
+    assert TRACK.stroke.fed.tolist() == [0.5, 0.5]
+    apart = Toolpath(kind="polyline", points=((0, 0), (1, 0), (2, 0), (5, 0)), speed=1.0, flows=(2.0, 0.0, 1.0))
+    track = Track.of(apart, 0.0, 0.1)
+    assert [rows.tolist() for rows in track.strokes] == [[0, 1], [2, 3]] and not track.repeats
+    assert track.stroke.points.tolist() == [[2, 0], [5, 0]]
+
+
+def test_of_two_times_at_which_as_much_was_fed_the_first_counts():
+    """At the end of the first stroke, not when the pause is over; the interval is that of the stroke."""
+    assert TRACK.release_time(3.5) == 3.5 and TRACK.interval(3.5) == 1
+    assert TRACK.interval(np.array([0.0, 1.5, 3.6, 7.0])).tolist() == [0, 0, 3, 4]
 
 
 def test_fed_time_stands_still_in_pauses_and_release_time_inverts_it():
@@ -91,7 +94,7 @@ def test_a_fixed_nozzle_feeds_for_its_dwell_on_every_layer():
     hasty = Toolpath(start=(1, 2), speed=0.0, dwell=3.0, layers=2, layer_height=0.1)
     assert Track.of(hasty, 0.0, 0.2).time.tolist() == [0.0, 3.0, 3.0, 6.0]
     single = Track.of(Toolpath(start=(1, 2), speed=0.0, dwell=3.0), 0.0, 0.2)
-    assert single.time.tolist() == [0.0, 3.0] and single.velocity(1.0).tolist() == [0, 0, 0]
+    assert single.time.tolist() == [0.0, 3.0] and single.velocity_in.tolist() == [[0, 0, 0]]
     assert single.at(2.0).tolist() == [1, 2, 0.2] and single.layer.tolist() == [0]
 
 
@@ -104,7 +107,7 @@ def test_a_ring_is_180_chords_and_always_goes_the_same_way_round():
     track, turn = Track.of(path, 0.0, 0.1), path.length() / 2.0
     assert track.at(turn / 4)[:2] == pytest.approx([1, 2.5])
     assert track.at(turn + 0.05 + turn / 4) == pytest.approx([1, 2.5, 0.2])
-    assert track.velocity(0.0) == pytest.approx([-2 * math.sin(math.pi / 180), 2 * math.cos(math.pi / 180), 0])
+    assert track.velocity_in[0] == pytest.approx([-2 * math.sin(math.pi / 180), 2 * math.cos(math.pi / 180), 0])
 
 
 def test_corners_of_lines_and_walls():

@@ -8,7 +8,7 @@ from fluidbench.errors import UserError
 from fluidbench.scenario.library import define, load
 from fluidbench.scenario.model import Model
 from fluidbench.scenario.scenario import Scenario
-from fluidbench.scenario.units import in_si, unit
+from fluidbench.scenario.units import amount, in_si, unit
 
 from ..conftest import bead
 
@@ -53,6 +53,13 @@ def test_a_quantity_is_a_number_in_si(text, wanted, value):
 @pytest.mark.parametrize("millimetres", [20, 12, 1.5, 0.1, 33.3, 7])
 def test_a_length_in_millimetres_is_the_very_number_of_metres(millimetres):
     assert in_si(f"{millimetres} mm", "m") == float(f"{millimetres}e-3")
+
+
+def test_an_amount_is_a_number_whatever_it_was_written_as():
+    assert [amount(value, "m") for value in (0.02, 2, "0.02", "20 mm")] == [0.02, 2.0, 0.02, 0.02]
+    for wrong in ("abc", None, "12 Pa"):
+        with pytest.raises(ValueError, match=r"no number|another kind"):
+            amount(wrong, "m")
 
 
 def test_what_is_no_text_or_has_no_unit_stays_as_it_is():

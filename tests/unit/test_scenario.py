@@ -12,7 +12,8 @@ from fluidbench.method.timestep import Bound, damped_limit, plan
 from fluidbench.scenario.layout import sample
 from fluidbench.scenario.library import load, parse_override, shipped, validate
 from fluidbench.scenario.material import Material
-from fluidbench.scenario.toolpath import Toolpath, Track
+from fluidbench.scenario.toolpath import Toolpath
+from fluidbench.scenario.track import Track
 
 from ..conftest import bead, scenario
 
@@ -115,7 +116,7 @@ def test_track_of_a_wall_goes_back_and_forth_with_pauses():
     assert track.end == pytest.approx(5.0)
     assert np.allclose(track.at(1.0), [0.5, 0, 0.2]) and np.allclose(track.at(4.0), [0.5, 0, 0.3])
     assert track.extruded(2.5) == pytest.approx(2.0)
-    assert np.allclose(track.velocity(1.0), [0.5, 0, 0]) and np.allclose(track.velocity(2.5), 0)
+    assert np.allclose(track.velocity_in, [[0.5, 0, 0], [0, 0, 0.1], [-0.5, 0, 0]])
     assert track.release_time(2.5) == pytest.approx(3.5)
     assert list(track.layer_at(np.array([0.5, 4.5]))) == [0, 1]
 
