@@ -9,6 +9,7 @@ from .body import Body
 if TYPE_CHECKING:
     from .scenario import Scenario
 
+NOZZLE = "nozzle (standoff and layers)"
 VOLUMES = 2.0  # largest factor between a particle's own volume and spacing^3
 
 
@@ -24,10 +25,13 @@ def check_nozzle(scenario: "Scenario") -> None:
     r = scenario.nozzle.diameter / 2
     margin = np.array([r, r, 0.0])
     low, high = scenario.track.position.min(axis=0) - margin, scenario.track.position.max(axis=0) + margin
+    if scenario.fed_from is not None:
+        high[2] = scenario.fed_from
     for axis, a, b in zip("xyz", low, high, strict=True):
         i = "xyz".index(axis)
         if a < scenario.domain.lower[i] or b > scenario.domain.upper[i]:
-            what = "nozzle (standoff and layers)" if axis == "z" else "toolpath (with the nozzle's radius)"
+            what = "nozzle (standoff, layers, bore and what feeds it)" if scenario.fed_from is not None else NOZZLE
+            what = what if axis == "z" else "toolpath (with the nozzle's radius)"
             raise ValueError(
                 f"the {what} spans {axis} = {a:.6g} .. {b:.6g} m and leaves the domain, which spans "
                 f"{scenario.domain.lower[i]:.6g} .. {scenario.domain.upper[i]:.6g} m"

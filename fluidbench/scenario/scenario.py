@@ -19,7 +19,8 @@ from .extent import check_size, check_time
 from .material import Material
 from .measured import Measured
 from .model import Matrix, Model, Positive, Vector
-from .nozzle import Nozzle
+from .nozzle import COLUMN, Nozzle
+from .outline import Outline
 from .places import check_bodies, check_collider, check_nozzle
 from .plausible import warnings
 from .slicer import completed
@@ -243,9 +244,30 @@ class Scenario(Model):
     @cached_property
     def feeding_pressure(self) -> float:
         """eta U / D [Pa], of matter that a nozzle of diameter D feeds at U: the scale of the viscous stress that pushes
-        and pulls it. A liquid that resists compression with less changes its density by as much, one that carries
-        less tension is torn apart by its own viscosity. (Motion that nobody feeds runs out of energy before.)"""
-        return 0.0 if self.nozzle is None else self.material.viscosity * self.feeding_speed / self.nozzle.diameter
+        and pulls it; of a body `Nozzle.resistance` times that. A liquid that resists compression with less changes its
+        density by as much, one that carries less tension is torn apart by its own viscosity. (Motion that nobody feeds
+        runs out of energy before.)"""
+        if self.nozzle is None:
+            return 0.0
+        return self.nozzle.resistance * self.material.viscosity * self.feeding_speed / self.nozzle.diameter
+
+    @property
+    def outline(self) -> Outline | None:
+        """Of the rigid body that matter is pressed through, if there is one."""
+        return None if self.nozzle is None else self.nozzle.outline
+
+    @property
+    def sticks(self) -> bool:
+        """Whether there is one and matter sticks to it."""
+        return self.outline is not None and not self.outline.slips
+
+    @property
+    def fed_from(self) -> float | None:
+        """Height from which matter comes into the bore of a body, at most [m]; None without one."""
+        if self.nozzle is None or self.track is None or self.outline is None:
+            return None
+        above = self.nozzle.rise + (COLUMN + 1) * self.spacing
+        return float(self.track.position[:, 2].max()) + above
 
     @property
     def viscous_tension(self) -> float:

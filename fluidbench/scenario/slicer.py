@@ -158,6 +158,8 @@ def _room(table: dict[str, Any], corners: np.ndarray, seconds: float) -> dict[st
     """Domain and duration where the table has none."""
     size = _number(table["nozzle"]["diameter"], "nozzle.diameter")
     low, high = corners.min(axis=0) - MARGIN * size, corners.max(axis=0) + MARGIN * size
+    if table["nozzle"].get("tip", "none") != "none":
+        high[2] += _number(table["nozzle"].get("bore", size), "nozzle.bore")
     found = dict(table)
     domain = found.get("domain")
     if domain is None or (isinstance(domain, dict) and not {"lower", "upper"} & set(domain)):

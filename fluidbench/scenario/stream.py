@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from .bore import Bore
+from .nozzle import COLUMN, Nozzle
 from .scenario import Scenario
+from .track import Track
 
-COLUMN = 4  # discs held inside the nozzle: more than any method's support radius
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # by which what follows turns: evenly all around
 
 
 def disc(radius: float, spacing: float) -> np.ndarray:
@@ -31,63 +34,169 @@ def disc(radius: float, spacing: float) -> np.ndarray:
     return points * np.sqrt(np.pi * radius**2 / (len(points) * spacing**2))
 
 
+def rings(radius: float, spacing: float) -> np.ndarray:
+    """Points on rings about a spacing apart, shape (n, 2) [m], the last half of that in front of the radius: matter
+    that fills a bore."""
+    many = max(1, round(radius / spacing))
+    points = []
+    for k in range(many):
+        n = round(np.pi * (2 * k + 1) * (radius / spacing / many) ** 2)
+        angle = 2.0 * np.pi * (np.arange(n) + 0.5 * (k % 2)) / n
+        r = (k + 0.5) * radius / many
+        points.append(np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1))
+    return np.concatenate(points)
+
+
 @dataclass(frozen=True)
 class Stream:
-    """Everything that a scenario's nozzle will ever emit, on the host in float64."""
+    """Everything that a scenario's nozzle will ever emit, on the host in float64: rows of particles that move as one,
+    in the order in which they enter. As a plug, a row is a disc; where a profile develops, each particle is one."""
 
     scenario: Scenario
 
     @cached_property
     def offsets(self) -> np.ndarray:
         """Points of one disc about the nozzle axis, shape (n, 2) [m]."""
+        fill = disc if self.nozzle.tip == "none" else rings
+        return fill(self.nozzle.diameter / 2.0, self.scenario.spacing)
+
+    @property
+    def nozzle(self) -> Nozzle:
         assert self.scenario.nozzle is not None
-        return disc(self.scenario.nozzle.diameter / 2.0, self.scenario.spacing)
+        return self.scenario.nozzle
+
+    @property
+    def track(self) -> Track:
+        assert self.scenario.track is not None
+        return self.scenario.track
 
     @cached_property
+    def points(self) -> int:
+        """Particles of a row."""
+        return 1 if self.nozzle.develops else len(self.offsets)
+
+    @cached_property
+    def paces(self) -> np.ndarray:
+        """Speed over the mean, of each point of a disc where they differ; (1,) in a plug. Their mean is 1: the flow
+        rate is exact."""
+        if not self.nozzle.develops:
+            return np.ones(1)
+        bore = Bore(self.scenario.material, self.nozzle.diameter, self.nozzle.speed)
+        paces = bore.profile(np.linalg.norm(self.offsets, axis=1))
+        return paces / paces.mean()
+
+    @cached_property
+    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """(point of a disc, time at which it is let go as `extruding`) of each row, in the order in which they come."""
+        period = self.scenario.spacing / self.nozzle.speed / self.paces
+        end = min(self.track.end, self.scenario.duration)
+        total = float(self.track.extruded(end))
+        filling = self._filling
+        left = COLUMN + 1 if filling else 0  # what a bore keeps above it
+        many = [left + int(total / each + 0.5 + 1e-9) for each in period]
+        point = np.concatenate([np.full(filling + n, k) for k, n in enumerate(many)])
+        extruding = np.concatenate([(np.arange(-filling, n) + 0.5) * period[k] for k, n in enumerate(many)])
+        order = np.argsort(extruding - self._ahead * period[point], kind="stable")
+        return point[order], extruding[order]
+
+    @property
+    def _filling(self) -> int:
+        """Discs that fill the bore from the start."""
+        return round(self.nozzle.rise / self.scenario.spacing)
+
+    @property
+    def filled(self) -> float:
+        """Volume that the bore holds from the start [m^3]."""
+        return self._filling * self.scenario.spacing * self.nozzle.area
+
+    @property
+    def _ahead(self) -> float:
+        """Spacings above the place where it is let go at which a row enters."""
+        return COLUMN + 0.5
+
+    @property
+    def pace(self) -> np.ndarray:
+        """Speed of each row over the mean, shape (rows,)."""
+        return self.paces[self._rows[0]]
+
+    @cached_property
+    def offset(self) -> np.ndarray:
+        """Of a row's particles about the nozzle axis: all of a disc (n, 2), or each row's one (rows, 2) [m]; those
+        turn about the axis from row to row, or they would follow each other in threads."""
+        if not self.nozzle.develops:
+            return self.offsets
+        point, extruding = self._rows
+        x, y = self.offsets[point].T
+        turn = GOLDEN * np.rint(extruding * self.nozzle.speed * self.pace / self.scenario.spacing - 0.5)
+        return np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)], axis=1)
+
+    @property
     def extruding(self) -> np.ndarray:
-        """Time that the nozzle's flow takes for each disc and all before it, shape (layers,) [s]; half a disc early, so
-        the emitted mass is within half a disc of what is fed at any time."""
-        assert self.scenario.nozzle is not None and self.scenario.track is not None
-        period = self.scenario.spacing / self.scenario.nozzle.speed
-        end = min(self.scenario.track.end, self.scenario.duration)
-        total = float(self.scenario.track.extruded(end))
-        return (np.arange(int(total / period + 0.5 + 1e-9)) + 0.5) * period
+        """Time that the nozzle's flow takes for each row and all before it, shape (rows,) [s]; half a disc early, so
+        the emitted mass is within half a disc of what is fed at any time. Below zero for those that fill the bore from
+        the start."""
+        return self._rows[1]
 
     @cached_property
     def release_time(self) -> np.ndarray:
-        """When each disc leaves the nozzle, shape (layers,) [s]."""
-        assert self.scenario.track is not None
-        return self.scenario.track.release_time(self.extruding)
+        """When each row is let go, shape (rows,) [s]; never, what is above the bore at the end."""
+        total = float(self.track.extruding[-1])
+        return np.where(self.extruding > total, np.inf, self._at(self.extruding))
+
+    @cached_property
+    def birth_time(self) -> np.ndarray:
+        """When each row leaves the nozzle, shape (rows,) [s]: when it is let go or, in a bore, as much later as what is
+        below it takes; of what is left in there, after the end."""
+        return self._at(self.extruding + self.nozzle.rise / (self.nozzle.speed * self.pace))
+
+    def _at(self, extruded: np.ndarray) -> np.ndarray:
+        """When so much was extruded [s], as if it had gone on so before and after the track."""
+        total = float(self.track.extruding[-1])
+        found = self.track.release_time(np.clip(extruded, 0.0, total))
+        return found + np.minimum(extruded, 0.0) + np.maximum(extruded - total, 0.0)
+
+    @cached_property
+    def release_point(self) -> np.ndarray:
+        """Where each row is let go, shape (rows, 3) [m]: at the exit or, of a body, at the upper end of its bore."""
+        early = np.minimum(self.release_time, 0.0)[:, None] * self.track.velocity_in[0]
+        return self.outlet(np.minimum(self.release_time, self.track.end)) + early
+
+    def outlet(self, time) -> np.ndarray:
+        """Where matter is let go at `time`, shape (..., 3) [m]."""
+        return self.track.at(time) + np.array([0.0, 0.0, self.nozzle.rise])
 
     @cached_property
     def velocity(self) -> np.ndarray:
-        """Velocity of each disc at its release, shape (layers, 3) [m/s]: the nozzle's plus the exit speed downwards."""
-        assert self.scenario.nozzle is not None and self.scenario.track is not None
-        track = self.scenario.track
-        i = track.interval(self.extruding)
-        down = self.scenario.nozzle.speed * track.flow_in[i]
-        return track.velocity_in[i] - down[:, None] * [0.0, 0.0, 1.0]
+        """Velocity of each row at its release, shape (rows, 3) [m/s]: the nozzle's plus the exit speed downwards."""
+        i = self.track.interval(self.extruding)
+        down = self.nozzle.speed * self.track.flow_in[i] * self.pace
+        return self.track.velocity_in[i] - down[:, None] * [0.0, 0.0, 1.0]
 
     @property
     def volume(self) -> float:
         """Rest volume of a particle [m^3]: a disc of exactly the nozzle's area shared among its points."""
-        assert self.scenario.nozzle is not None
-        return self.scenario.nozzle.area * self.scenario.spacing / len(self.offsets)
+        return self.nozzle.area * self.scenario.spacing / len(self.offsets)
 
     @property
     def particles(self) -> int:
-        return len(self.offsets) * len(self.extruding)
+        return self.points * len(self.extruding)
+
+    @cached_property
+    def _entry(self) -> np.ndarray:
+        return self.extruding - self._ahead * self.scenario.spacing / (self.nozzle.speed * self.pace)
+
+    @cached_property
+    def _released(self) -> np.ndarray:
+        return np.sort(self.release_time)
 
     def entered(self, time) -> Any:
-        """How many discs are in the nozzle or beyond at `time` [s], a number or an array."""
-        assert self.scenario.nozzle is not None and self.scenario.track is not None
-        ahead = (COLUMN + 0.5) * self.scenario.spacing / self.scenario.nozzle.speed
-        return np.searchsorted(self.extruding, self.scenario.track.extruded(time) + ahead)
+        """How many rows are in the nozzle or beyond at `time` [s], a number or an array."""
+        return np.searchsorted(self._entry, self.track.extruded(time))
 
     def released(self, time) -> Any:
-        """How many discs have left the nozzle at `time` [s], a number or an array."""
-        return np.searchsorted(self.release_time, time, side="right")
+        """How many rows were let go at `time` [s], a number or an array."""
+        return np.searchsorted(self._released, time, side="right")
 
     def mass(self, time: float) -> float:
         """Mass released up to `time` [kg]."""
-        return self.released(time) * len(self.offsets) * self.volume * self.scenario.material.density
+        return self.released(time) * self.points * self.volume * self.scenario.material.density
