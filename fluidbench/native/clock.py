@@ -23,7 +23,7 @@ class Hours:
 
     row: wp.array(dtype=int)
     time: wp.array(dtype=float)  # [s]
-    exit: wp.array(dtype=wp.vec3)  # of the nozzle [m]
+    exit: wp.array(dtype=wp.vec3)  # where matter is let go [m]
     drift: wp.array(dtype=wp.vec3)  # its mean velocity until the next row [m/s]
     extruded: wp.array(dtype=float)  # time spent extruding [s]
     entered: wp.array(dtype=int)  # particles of the stream in the nozzle or beyond
@@ -43,7 +43,7 @@ class Clock:
         self.scenario, self.crew = scenario, crew
         self.first, self.tick = -1, scenario.schedule[0]  # tick number of the first row, its length [s]
         self._row = 0  # of the device, once all that was enqueued is done
-        self._entered = self._released = np.zeros(1, int)  # particles, discs
+        self._entered = self._released = np.zeros(1, int)  # particles, rows
         hours = self.hours = Hours()
         hours.tick = self.tick
         with wp.ScopedDevice(crew.device):
@@ -55,6 +55,12 @@ class Clock:
     @cached_property
     def stream(self) -> Stream | None:
         return Stream(self.scenario) if self.scenario.nozzle is not None else None
+
+    @property
+    def last_birth(self) -> float:
+        """Later than anything is born [s]."""
+        births = [] if self.stream is None else self.stream.birth_time
+        return 2.0 * max(self.scenario.duration, float(np.max(births, initial=0.0)))
 
     def show(self, ticks: int) -> None:
         """Make the row after so many ticks the present one."""
@@ -76,7 +82,7 @@ class Clock:
 
     @property
     def released(self) -> int:
-        """Discs of the stream that have left the nozzle."""
+        """Rows of the stream that were let go."""
         return int(self._released[self._row])
 
     def strike(self) -> None:
@@ -95,8 +101,8 @@ class Clock:
     def _write(self, times: np.ndarray) -> None:
         track = self.scenario.track
         columns = {"time": times}
-        if track is not None:
-            exits = track.at(times)
+        if track is not None and self.stream is not None:
+            exits = self.stream.outlet(times)
             step = np.diff(times)[:, None]
             columns |= {
                 "exit": exits,
@@ -104,8 +110,7 @@ class Clock:
                 "extruded": track.extruded(times),
             }
             columns["drift"][:-1] /= step
-        if self.stream is not None:
-            columns["entered"] = self._entered = self.stream.entered(times) * len(self.stream.offsets)
+            columns["entered"] = self._entered = self.stream.entered(times) * self.stream.points
             self._released = self.stream.released(times)
         for name, values in columns.items():
             array: wp.array = getattr(self.hours, name)

@@ -80,7 +80,7 @@ class Pool:
             "volume": volume,
             "phase": (0, self.scene.levels - 1),
             "held": (0, 2),
-            "birth_time": (0.0, 2.0 * self.scene.scenario.duration),
+            "birth_time": (0.0, self.scene.clock.last_birth),
         }.get(name, (-MOST, MOST))
 
     def add_field(

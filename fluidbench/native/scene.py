@@ -13,6 +13,7 @@ from ..errors import UserError
 from ..method.vitals import top_speed
 from ..scenario import Friction, Scenario
 from ..scenario.material import Material
+from .carriage import Carriage
 from .clock import Clock
 from .crew import Crew
 from .device import quiet_warp
@@ -116,6 +117,9 @@ class Scene:
             self.levels = len(rows) // self.worlds  # rows of the phase table: levels of cure, the fresh material first
             table = [self._phase(*row) for row in rows]
             self.phases = wp.array(table, dtype=Phase).reshape((self.worlds, self.levels))
+        self.outline = self.scenario.outline
+        carries = self.scenario.collider is not None or self.outline is not None
+        self.carriage = Carriage(self.crew, self.clock.hours, self.dt) if carries else None
 
     def _check_worlds(self) -> None:
         vary = {"material", "gravity", "body_force", "body_force_gradient", "name", "title", "seed"}

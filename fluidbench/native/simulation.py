@@ -18,7 +18,7 @@ from ..registry import get_method
 from ..scenario import Scenario
 from ..scenario.layout import capacity_of, emitted, generations
 from ..scenario.numerics import configure
-from . import clock, crew, health, pool, sorting
+from . import carriage, clock, crew, health, pool, sorting
 from .device import CountedLaunches
 from .health import Health, Letter, Vital
 from .pool import Pool
@@ -57,7 +57,7 @@ class Simulation(Session):
         self.scenario = self.scene.scenario
         self.config = configure(solver_class, self.scenario) if config is None else config
         for scenario in self.scene.scenarios:
-            if reason := refusal(solver_class, scenario, self.config):
+            if reason := refusal(solver_class, scenario, self.config, target):
                 raise UserError(f"{solver_class.name} cannot run {scenario.name}: {reason}")
         self.pool = Pool(self.scene, capacity_of(self.scenario))
         self.placement = Placement(self.scenario, self.pool)
@@ -105,6 +105,7 @@ class Simulation(Session):
         for module in (clock, crew, health, pool):
             self.scene.crew.load(module)
         parts = [(emission, self.emission), (curing, self.curing), (contact, self.contact)]
+        parts += [(carriage, self.scene.carriage)]
         parts += [(module, self.growing) for module in (expansion, births)]
         for module in (module for module, part in parts if part is not None):
             self.scene.crew.load(module)
@@ -208,8 +209,8 @@ class Simulation(Session):
                     self.solver.settle()
             if self.curing is not None:
                 self.curing.ripen()
-            if self.contact is not None:
-                self.contact.follow()
+            if self.scene.carriage is not None:
+                self.scene.carriage.follow()
         if self.scene.crew.leading:
             self.process_launches = max(self.process_launches, counted.count)
 
@@ -291,6 +292,8 @@ class Simulation(Session):
         """Everything of one substep, as it is captured."""
         with CountedLaunches() as counted:
             self.solver.substep()
+            if self.scene.carriage is not None:
+                self.scene.carriage.substep()
             if self.contact is not None:
                 self.contact.substep()
         if self.scene.crew.leading:

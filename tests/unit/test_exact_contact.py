@@ -47,8 +47,10 @@ def touch(places, velocities, held=0, friction=0.3, parts=(BLOCK,), substeps=1, 
     contact = Contact(scene, pool)
     scene.set_dt(DT)
     for start, number in ((now - 0.004, earlier), (now, substeps)):
-        contact.advance(start, 0.004)
+        scene.clock.set(start, 0.004)
+        scene.carriage.follow()
         for _ in range(number):
+            scene.carriage.substep()
             contact.substep()
     after = pool.velocity.numpy().copy()
     assert (after[:n] == after[pool.capacity : pool.capacity + n]).all()

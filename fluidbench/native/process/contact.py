@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from ...method.frame import FREE
-from ..clock import Hours
+from ..carriage import Pose, place_of
 from ..crew import index_of
 from ..pool import Pool
 from ..scene import Scene
@@ -22,14 +22,11 @@ RELAX = wp.constant(0.1)  # share of the depth that a substep takes back
 
 @wp.struct
 class Parts:
-    """The collider on the device; the pose is that at the start of the tick."""
+    """The collider on the device."""
 
-    center: wp.array(dtype=wp.vec3)  # relative to the nozzle exit, clearance included [m]
+    center: wp.array(dtype=wp.vec3)  # relative to what it is carried by, clearance included [m]
     half: wp.array(dtype=wp.vec3)
     round: wp.array(dtype=int)  # 1 for a sphere
-    exit: wp.array(dtype=wp.vec3)  # [m]
-    velocity: wp.array(dtype=wp.vec3)  # [m/s]
-    elapsed: wp.array(dtype=float)  # since the start of the tick [s]
     friction: float
 
 
@@ -58,6 +55,7 @@ def surface(parts: Parts, k: int, r: wp.vec3):
 def collide(
     share: wp.vec3i,
     parts: Parts,
+    pose: Pose,
     spacing: float,
     capacity: int,
     count: wp.array(dtype=int),
@@ -72,8 +70,8 @@ def collide(
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
         h = dt[world]
-        base = parts.exit[0] + parts.elapsed[0] * parts.velocity[0]
-        v = velocity[i] - parts.velocity[0]
+        base = place_of(pose)
+        v = velocity[i] - pose.velocity[0]
         touched = int(0)
         for k in range(parts.half.shape[0]):
             distance, normal = surface(parts, k, position[i] - base - parts.center[k])
@@ -87,32 +85,17 @@ def collide(
                 v = slide * (1.0 - grip / wp.max(speed, 1.0e-9)) + away * normal
                 touched = 1
         if touched == 1:
-            velocity[i] = v + parts.velocity[0]
-
-
-@wp.kernel
-def pose(hours: Hours, parts: Parts):
-    """The collider goes with the nozzle."""
-    row = hours.row[0]
-    parts.exit[0] = hours.exit[row]
-    parts.velocity[0] = hours.drift[row]
-    parts.elapsed[0] = 0.0
-
-
-@wp.kernel
-def pass_time(dt: wp.array(dtype=float), elapsed: wp.array(dtype=float)):
-    """The collider moves on by a substep."""
-    elapsed[0] = elapsed[0] + dt[0]
+            velocity[i] = v + pose.velocity[0]
 
 
 class Contact:
-    """Carries the collider along the toolpath and lets it push."""
+    """Lets the collider, which is carried along the toolpath, push."""
 
     def __init__(self, scene: Scene, pool: Pool) -> None:
-        collider = scene.scenario.collider
-        assert collider is not None
-        self.scene, self.pool = scene, pool
-        lift = np.array([0.0, 0.0, collider.clearance])
+        collider, nozzle = scene.scenario.collider, scene.scenario.nozzle
+        assert collider is not None and nozzle is not None and scene.carriage is not None
+        self.scene, self.pool, self.pose = scene, pool, scene.carriage.pose
+        lift = np.array([0.0, 0.0, collider.clearance - nozzle.rise])
         self.parts = Parts()
         self.parts.friction = collider.friction
         centers = np.array([np.asarray(part.center) + lift for part in collider.parts], np.float32)
@@ -121,29 +104,13 @@ class Contact:
             self.parts.center = wp.array(centers, dtype=wp.vec3)
             self.parts.half = wp.array(halves, dtype=wp.vec3)
             self.parts.round = wp.array([int(part.kind == "sphere") for part in collider.parts], dtype=int)
-            self.parts.exit, self.parts.velocity = wp.zeros(1, dtype=wp.vec3), wp.zeros(1, dtype=wp.vec3)
-            self.parts.elapsed = wp.zeros(1, dtype=float)
-
-    def follow(self) -> None:
-        """Enqueue: put it where the nozzle is, moving to where it will be a tick later."""
-        self.scene.crew.launch(pose, 1, [self.scene.clock.hours, self.parts])
-
-    def advance(self, now: float, tick: float) -> None:
-        """The same at any time `now` [s], for a tick of any length [s]."""
-        self.scene.clock.set(now, tick)
-        self.follow()
 
     def substep(self) -> None:
         """Enqueue the contact of one substep; captured with the solver's own."""
-        pool, launch = self.pool, self.scene.crew.launch
-        launch(pass_time, 1, [self.scene.dt], [self.parts.elapsed])
-        launch(
-            collide,
-            pool.size,
-            [self.parts, self.scene.spacing, pool.capacity, pool.count, self.scene.dt, pool.held, pool.position],
-            [pool.velocity],
-        )
+        pool, scene = self.pool, self.scene
+        inputs = [self.parts, self.pose, scene.spacing, pool.capacity, pool.count, scene.dt, pool.held, pool.position]
+        scene.crew.launch(collide, pool.size, inputs, [pool.velocity])
 
     def footprint(self) -> dict[str, int]:
-        names = ("center", "half", "round", "exit", "velocity", "elapsed")
+        names = ("center", "half", "round")
         return {f"collider.{name}": getattr(self.parts, name).capacity for name in names}

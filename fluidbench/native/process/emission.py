@@ -20,15 +20,16 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Pipe:
-    """The stream on the device; disc and point of a particle follow from its number in the stream."""
+    """The stream on the device; a particle's row and its offset follow from its number in the stream."""
 
     first_origin: int
-    points: int
-    exit_speed: float
+    points: int  # of a row
     volume: float
-    offsets: wp.array(dtype=wp.vec2)
+    offsets: wp.array(dtype=wp.vec2)  # of the points of a row, or of each row
+    speed: wp.array(dtype=float)  # [m/s]
     extruding: wp.array(dtype=float)
     release_time: wp.array(dtype=float)
+    birth_time: wp.array(dtype=float)
     release_point: wp.array(dtype=wp.vec3)
     release_velocity: wp.array(dtype=wp.vec3)
 
@@ -36,8 +37,9 @@ class Pipe:
 @wp.func
 def inside_nozzle(pipe: Pipe, number: int, hours: Hours, row: int):
     """Where particle `number` of the stream is at the hour of a row."""
-    offset = pipe.offsets[number % pipe.points]
-    rise = pipe.exit_speed * (pipe.extruding[number / pipe.points] - hours.extruded[row])
+    offset = pipe.offsets[number % pipe.offsets.shape[0]]
+    line = number / pipe.points
+    rise = pipe.speed[line] * (pipe.extruding[line] - hours.extruded[row])
     return hours.exit[row] + wp.vec3(offset[0], offset[1], rise)
 
 
@@ -68,7 +70,7 @@ def insert(
         volume[slot] = pipe.volume
         mass[slot] = pipe.volume * densities[world, 0]
         held[slot] = CARRIED
-        birth_time[slot] = pipe.release_time[number / pipe.points]
+        birth_time[slot] = pipe.birth_time[number / pipe.points]
         origin[slot] = pipe.first_origin + number
         number += lanes
         slot += lanes
@@ -102,7 +104,7 @@ def push(
     if i % capacity < count[i / capacity] and held[i] == CARRIED:
         number = origin[i] - pipe.first_origin
         layer = number / pipe.points
-        offset = pipe.offsets[number % pipe.points]
+        offset = pipe.offsets[number % pipe.offsets.shape[0]]
         late = hours.time[row] - pipe.release_time[layer]
         if late >= 0.0:
             held[i] = FREE
@@ -116,18 +118,19 @@ class Emission:
     """Feeds the pool from a scenario's nozzle, once a tick."""
 
     def __init__(self, scene: Scene, pool: Pool) -> None:
-        stream, track, nozzle = scene.clock.stream, scene.scenario.track, scene.scenario.nozzle
-        assert track is not None and nozzle is not None and stream is not None
+        stream = scene.clock.stream
+        assert stream is not None
         self.scene, self.pool, self.stream = scene, pool, stream
         self.inserted = self.released = 0
         self.pipe = Pipe()
-        self.pipe.first_origin, self.pipe.points = pool.counts[0], len(stream.offsets)
-        self.pipe.exit_speed, self.pipe.volume = nozzle.speed, stream.volume
+        self.pipe.first_origin, self.pipe.points, self.pipe.volume = pool.counts[0], stream.points, stream.volume
         columns = {
-            "offsets": (stream.offsets, wp.vec2),
+            "offsets": (stream.offset, wp.vec2),
+            "speed": (stream.nozzle.speed * stream.pace, float),
             "extruding": (stream.extruding, float),
             "release_time": (stream.release_time, float),
-            "release_point": (track.at(stream.release_time), wp.vec3),
+            "birth_time": (stream.birth_time, float),
+            "release_point": (stream.release_point, wp.vec3),
             "release_velocity": (stream.velocity, wp.vec3),
         }
         for name, (values, dtype) in columns.items():
@@ -138,7 +141,7 @@ class Emission:
             self._inserted = wp.zeros(1, dtype=int)
 
     def progress(self) -> list[int]:
-        """How many particles are in the nozzle or beyond, and how many discs have left it."""
+        """How many particles are in the nozzle or beyond, and how many rows were let go."""
         return [self.inserted, self.released]
 
     def go_on(self, progress: list[int]) -> None:
@@ -163,7 +166,8 @@ class Emission:
     def feed(self) -> None:
         """Enqueue what the hour of the clock brings: insert, release, and move what is in the nozzle on its way to its
         place one tick later."""
-        pool, launch, hours, lanes = self.pool, self.scene.crew.launch, self.scene.clock.hours, self.pipe.points
+        pool, launch, hours = self.pool, self.scene.crew.launch, self.scene.clock.hours
+        lanes = len(self.stream.offsets)
         launch(
             insert,
             (pool.worlds, lanes),
