@@ -10,8 +10,11 @@ from typing import Any, Protocol
 import warp as wp
 
 from fluidbench.errors import UserError
+from fluidbench.method.features import Feature
 from fluidbench.native.crew import Crew
 from fluidbench.native.scene import Scene
+
+LACKING = {"taichi": frozenset({Feature.TIP})}  # what the passes of a language do not do
 
 
 class Backend(Protocol):

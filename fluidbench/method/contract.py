@@ -7,6 +7,7 @@ at a time. An engine that owns its particles and its time step is another.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -172,6 +173,7 @@ class Method(ABC):
     Config: ClassVar[type[Config]]
     rank: ClassVar[int] = 100  # where it stands among others in tables
     backends: ClassVar[tuple[str, ...]] = ("warp",)  # languages of its kernels
+    lacking: ClassVar[Mapping[str, frozenset[Feature]]] = {}  # features that it does not have in one of them
     devices: ClassVar[tuple[str, ...]] = ("cpu", "cuda")
     shares_threads: ClassVar[bool] = False  # whether several threads of the CPU can share its Warp kernels
     bounded: ClassVar[bool] = True  # whether its bounds are of stability; otherwise they are of accuracy

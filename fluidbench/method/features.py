@@ -21,6 +21,7 @@ class Feature(Enum):
     CURE = "material parameters that change with age"
     EXPANSION = "rest volumes that grow"
     EMISSION = "material that comes from a nozzle"
+    TIP = "bodies that matter is pressed through"
     COLLIDER = "rigid bodies that are carried along"
     CLAMP = "bodies that keep their velocity"
     LATER = "bodies that appear later"
@@ -40,6 +41,7 @@ def needed(scenario: Scenario) -> frozenset[Feature]:
         Feature.CURE: m.cure is not None,
         Feature.EXPANSION: m.expansion is not None,
         Feature.EMISSION: scenario.nozzle is not None,
+        Feature.TIP: scenario.outline is not None,
         Feature.COLLIDER: scenario.collider is not None,
         Feature.CLAMP: any(body.clamped for body in scenario.bodies),
         Feature.LATER: any(body.start > 0 for body in scenario.bodies),

@@ -11,7 +11,7 @@ from ..errors import UserError
 from ..scenario.scenario import Scenario
 from .contract import Method
 from .features import needed
-from .target import DEFAULT_BACKEND, Target
+from .target import DEFAULT_BACKEND, HERE, Target
 from .timestep import Bound, lost_speed
 
 LOST = 0.1  # share of a scenario's own speed that single precision may lose
@@ -62,11 +62,13 @@ class Demands:
         return self.scenarios[-1]
 
 
-def refusal(method: type[Method], scenario: Scenario, config: Any) -> str | None:
-    """Why a method cannot run a scenario, for reasons of its own or for want of precision; None when it can."""
-    missing = sorted(feature.value for feature in needed(scenario) - method.features)
-    if missing:
-        return f"it has no {' and no '.join(missing)}"
+def refusal(method: type[Method], scenario: Scenario, config: Any, target: Target = HERE) -> str | None:
+    """Why a method cannot run a scenario on a target, for reasons of its own or for want of precision; None when it
+    can."""
+    asked, lacking = needed(scenario), method.lacking.get(target.backend, frozenset())
+    for missing, where in ((asked - method.features, ""), (asked & lacking, f" on the backend {target.backend}")):
+        if missing:
+            return f"it has no {' and no '.join(sorted(feature.value for feature in missing))}{where}"
     lost, binding = _lost(method, scenario, config)
     if binding is not None and scenario.reference_speed > STILL and lost > LOST * scenario.reference_speed:
         return (

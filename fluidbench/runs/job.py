@@ -107,7 +107,8 @@ class Job(Work):
     def forestall(self, folder: Path) -> Record | None:
         """The record of a method that will not run the scenario, or of a machine that cannot."""
         scenario, method = Scenario.model_validate(self.scenario), get_method(self.method)
-        reason = refusal(method, scenario, configure(method, scenario)) or shortage(scenario, method, self.target)
+        reason = refusal(method, scenario, configure(method, scenario), self.target)
+        reason = reason or shortage(scenario, method, self.target)
         return None if reason is None else self.refuse(folder, reason)
 
     def perform(self, folder: Path, report: Report) -> None:

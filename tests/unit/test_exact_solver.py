@@ -12,6 +12,7 @@ from fluidbench.errors import UserError
 from fluidbench.method.contract import Config
 from fluidbench.method.features import Feature, needed
 from fluidbench.method.suitability import Demands, approximations, check_backend, refusal
+from fluidbench.method.target import Target
 from fluidbench.method.timestep import Bound
 from fluidbench.registry import get_method
 from fluidbench.scenario.model import Model, NonNegative, Positive, Vector, check_number, check_size
@@ -80,6 +81,7 @@ class Paced:
     """A method whose only bound is a constant over the wave speed."""
 
     name, features, dt = "paced", frozenset(Feature), 1.0
+    lacking: ClassVar = {"taichi": frozenset({Feature.YIELD})}
     Config: ClassVar = Config
 
     @classmethod
@@ -157,8 +159,10 @@ ASKS = {
     Feature.LATER: {"bodies": [BOX, BOX | {"center": [0.15] * 3, "start": 0.005}]},
     Feature.FIELD: {"body_force_gradient": np.diag([-1.0] * 3).tolist()},
 }
+PRESSING = {"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.010, "tip": "flat"}
 PRINTS = {
     Feature.EMISSION: {},
+    Feature.TIP: {"domain": {"lower": [-0.1, -0.1, 0.0], "upper": [0.3, 0.1, 0.4]}, "nozzle": PRESSING},
     Feature.COLLIDER: {"collider": {"parts": [{"kind": "sphere", "center": [0.0, 0.0, 0.03], "radius": 0.005}]}},
 }
 
@@ -183,6 +187,24 @@ def test_all_that_a_method_lacks_is_listed_in_order():
     )
     assert needed(scenario()) == frozenset() and refusal(plain, scenario(), None) == "its own reason"
     assert needed(scenario(material=SOLID)) == {Feature.ELASTICITY}
+
+
+def test_what_a_method_lacks_in_one_language_is_refused_there_alone():
+    yields = bead()
+    assert refusal(Paced, yields, None) == "its own reason"
+    assert refusal(Paced, yields, None, Target(backend="taichi")) == "it has no yield stress on the backend taichi"
+    assert refusal(Paced, scenario(), None, Target(backend="taichi")) == "its own reason"
+
+
+@pytest.mark.parametrize("method", ["mpm", "sph", "pbd"])
+def test_taichi_presses_nothing_through_a_body(method):
+    """The same scenario without one runs."""
+    solver, config = get_method(method), get_method(method).Config()
+    target, thick = Target(backend="taichi"), {"material": {"density": 1000.0, "viscosity": 5.0}}
+    pressed = bead(**PRINTS[Feature.TIP] | thick)
+    words = "it has no bodies that matter is pressed through on the backend taichi"
+    assert refusal(solver, pressed, config, target) == words
+    assert refusal(solver, pressed, config) is None and refusal(solver, bead(), config, target) is None
 
 
 def test_settings_of_methods_are_read_or_refused():
