@@ -142,6 +142,13 @@ class Section:
         return float((columns[-1] - columns[0] + 1) * (self.across[1] - self.across[0])) if len(columns) else 0.0
 
     @property
+    def contact(self) -> float:
+        """Width of what lies on the floor, from end to end [m]: of what fills space within half a spacing of it, where
+        the particles of matter lie that touches it."""
+        on = np.flatnonzero(self.solid[:, : FINE // 2].any(axis=1))
+        return float((on[-1] - on[0] + 1) * (self.across[1] - self.across[0])) if len(on) else 0.0
+
+    @property
     def height(self) -> float:
         """Highest point above the floor [m]."""
         rows = np.flatnonzero(self.solid.any(axis=0))

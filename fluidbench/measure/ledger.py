@@ -7,18 +7,20 @@ from ..scenario import Scenario
 from ..scenario.layout import emitted
 from .bead import Bead, laid_share, layer_heights, measure_bead
 from .deposit import Deposit
+from .feed import feeding, is_out
 from .slump import measure_slump
 from .tower import family_spread, is_tower, measure_tower, progress, standing
 
 
 def deposit_of(frame: Frame, scenario: Scenario) -> Deposit:
     """The deposited field of a snapshot, without what is still inside the nozzle."""
-    free = frame["held"] != CARRIED
+    free = is_out(frame, scenario)
     return Deposit.of(frame["position"][free], frame["volume"][free], scenario.domain, scenario.spacing)
 
 
 def ledger(frame: Frame, scenario: Scenario) -> dict[str, float]:
-    """Mass, momentum, energies and centre of mass of everything outside the nozzle, summed in float64."""
+    """Mass, momentum, energies and centre of mass of all that moves freely, outside the nozzle or in its bore, summed
+    in float64."""
     free = frame["held"] != CARRIED
     m = frame["mass"][free].astype(float)
     x, v = frame["position"][free].astype(float), frame["velocity"][free].astype(float)
@@ -43,14 +45,14 @@ def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
         row |= standing(deposit, scenario)
     elif scenario.track is not None and float(frame["time"]) >= scenario.track.end * (1.0 - 1e-6):
         row |= beads(frame, deposit, scenario)
-    return row | progress(frame, scenario)
+    return row | progress(frame, scenario) | feeding(frame, scenario)
 
 
 def bead_of(frame: Frame, deposit: Deposit, scenario: Scenario) -> Bead | None:
     """Sections along what was laid of the path: of all that lies there, or, where layers are not laid over one another,
     of the measured stroke's own matter."""
     path, track = scenario.toolpath, scenario.track
-    free = frame["held"] != CARRIED
+    free = is_out(frame, scenario)
     births = frame["birth_time"][free]
     if path is None or track is None:
         return None
@@ -65,7 +67,7 @@ def bead_of(frame: Frame, deposit: Deposit, scenario: Scenario) -> Bead | None:
 
 def beads(frame: Frame, deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     """Section of the bead and rise of the layers along what was laid of the path."""
-    bead, path, free = bead_of(frame, deposit, scenario), scenario.toolpath, frame["held"] != CARRIED
+    bead, path, free = bead_of(frame, deposit, scenario), scenario.toolpath, is_out(frame, scenario)
     if bead is None or path is None or scenario.track is None:
         return {}
     if not scenario.track.repeats:
@@ -79,7 +81,7 @@ def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     row = lengths(frame, scenario)
     if "bead_width_m" not in row:
         row |= beads(frame, deposit_of(frame, scenario), scenario)
-    free, path = frame["held"] != CARRIED, scenario.toolpath
+    free, path = is_out(frame, scenario), scenario.toolpath
     if path is not None and path.kind == "ring" and path.center is not None and path.speed > 0:
         center = np.average(frame["position"][free, :2], axis=0, weights=frame["mass"][free])
         row["ring_drift_m"] = float(np.hypot(*(center - path.center)))

@@ -67,16 +67,15 @@ def answers(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -
 
 
 def _mass(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> Answer:
-    """Mass rho Q t, exact to one disc."""
+    """Mass rho Q t, and what the bore held from the start; exact to one disc."""
     nozzle, track = scenario.nozzle, scenario.track
     assert nozzle is not None and track is not None
     t = float(series["time_s"].iloc[-1])
-    expected = scenario.material.density * nozzle.rate * float(track.extruded(t))
-    disc = Stream(scenario).volume * len(Stream(scenario).offsets) * scenario.material.density
-    off = final["mass_kg"] - expected
-    return Answer(
-        "emitted mass [kg]", final["mass_kg"], expected, abs(off) / disc, "in discs of one spacing", "rho Q t"
-    )
+    stream, density = Stream(scenario), scenario.material.density
+    expected = density * (nozzle.rate * float(track.extruded(t)) + stream.filled)
+    off = abs(final["mass_kg"] - expected) / (stream.volume * len(stream.offsets) * density)
+    source = "rho Q t" if stream.filled == 0.0 else "rho Q t, and the bore"
+    return Answer("emitted mass [kg]", final["mass_kg"], expected, off, "in discs of one spacing", source)
 
 
 def _area(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> Answer:

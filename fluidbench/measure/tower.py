@@ -14,6 +14,7 @@ import numpy as np
 from ..method.frame import CARRIED, Frame
 from ..scenario import Scenario
 from .deposit import Deposit
+from .feed import is_out
 
 SECTORS = 48  # parts of a path in which a layer must have material, at most
 SHORTEST = 3.0  # spacings that a sector is long, at least: shorter ones hold material by chance
@@ -53,7 +54,7 @@ def layer_of(frame: Frame, scenario: Scenario) -> np.ndarray:
     """Layer of every particle, shape (n,); -1 while it is in the nozzle."""
     assert scenario.track is not None
     layer = scenario.track.layer_at(frame["birth_time"].astype(float) - 1e-9)
-    return np.where(frame["held"] == CARRIED, -1, layer)
+    return np.where(is_out(frame, scenario), layer, -1)
 
 
 def measure_tower(frame: Frame, scenario: Scenario) -> dict[str, float]:
@@ -200,7 +201,7 @@ def _continuity(along: np.ndarray, across: np.ndarray, mass: np.ndarray, scenari
 
 def progress(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """What changes over time: mean degree of cure, share of mass cured to 95 %, and volume over fresh volume."""
-    free = frame["held"] != CARRIED
+    free = is_out(frame, scenario)
     row: dict[str, float] = {}
     m = scenario.material
     mass = frame["mass"][free].astype(float)

@@ -58,7 +58,7 @@ def spread(values: Sequence[float]) -> str:
     return number(mean(values)) if len(values) < 2 else f"{number(mean(values))} ± {stdev(values):.1g}"
 
 
-UNITS = {"m": "m", "m2": "m²", "kg": "kg", "J": "J", "s": "s", "MiB": "MiB"}
+UNITS = {"m": "m", "m2": "m²", "kg": "kg", "J": "J", "s": "s", "Pa": "Pa", "MiB": "MiB"}
 
 
 def readable(key: str, values: Sequence[float]) -> tuple[str, float]:

@@ -95,13 +95,15 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
 
 def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str, Any]:
     """What a completed run comes to, by the names that its record has for it."""
+    from ..measure.feed import fed
     from ..measure.ledger import final_lengths, ledger
     from ..measure.order import departures, order
     from ..measure.reference import answers
     from ..measure.rest import at_rest, creep, moving
     from ..measure.tower import is_tower, success, verdict_of
 
-    final = ledger(frame, scenario) | final_lengths(frame, scenario) | order(frame, scenario) | creep(series, scenario)
+    final = ledger(frame, scenario) | final_lengths(frame, scenario) | fed(series)
+    final |= order(frame, scenario) | creep(series, scenario)
     compared, not_compared = answers(scenario, series, final)
     criteria = success(scenario, final, series) if is_tower(scenario) else []
     restless = scenario.until == "rest" and not at_rest(series, scenario)

@@ -9,6 +9,7 @@ from typing import Any
 from ..registry import get_method
 from ..report.table import Table, number
 from ..scenario import Scenario
+from ..scenario.bore import Bore
 from .estimate import Estimate, estimate
 from .workplace import methods_of
 
@@ -50,6 +51,9 @@ def derived(scenario: Scenario) -> Table:
             ("exit speed U", n.speed, "m/s"),
             ("end of extrusion", scenario.track.end, "s"),
         ]
+        if scenario.sticks:
+            pressure = Bore(m, n.diameter, n.speed).pressure_drop(n.rise)
+            rows.append(("pressure along the bore, developed flow", pressure, "Pa"))
     table.rows.extend([name, number(value), unit] for name, value, unit in rows)
     return table
 
