@@ -279,6 +279,7 @@ def _translate(argument: Any) -> list[Any]:
         return [np.asarray(_Header(argument))]
     struct = argument._cls
     values = {name: getattr(argument, name) for name in struct.vars}
+    values = {name: v for name, v in values.items() if not hasattr(v, "_cls")}  # of a part, which no pass here has
     plain = {name: _plain(v) for name, v in values.items() if not isinstance(v, wp.array)}
     arrays = [np.asarray(_Header(v)) for v in values.values() if isinstance(v, wp.array)]
     return ([struct_of(struct)(**plain)] if plain else []) + arrays

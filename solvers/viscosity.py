@@ -91,9 +91,12 @@ class ImplicitViscosity:
         support: float,
         tolerance: float,
         kept: wp.array | None = None,
+        tool: Any = None,
     ) -> None:
         """`neighbours` hold pairs within the `support` [m]; `tolerance` is of the residual over v* [-]. Where elastic
-        stress is implicit, too, `kept` is the share of each particle's that flow leaves of it."""
+        stress is implicit, too, `kept` is the share of each particle's that flow leaves of it; `tool` is a rigid body
+        that drags along, if there is one."""
+        self.tooled = tool is not None
         self.scene, self.pool, self.backend, self.neighbours = scene, pool, backend, neighbours
         self.kernels = self.kernels_of(backend.name)
         self.num = kernels.Viscous()
@@ -111,13 +114,16 @@ class ImplicitViscosity:
         self.applying = kernels.Applying()
         self.applying.dt, self.applying.held, self.applying.image = scene.dt, pool.held, self.image
         self.applying.mass, self.applying.volume, self.applying.rows = pool.mass, pool.volume, self.rows
+        if tool is not None:
+            self.applying.tool = tool
+            self.driven = wp.zeros(pool.size, dtype=wp.vec3, device=scene.device)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         if backend == "taichi":
             from . import viscosity_taichi
 
             return viscosity_taichi.PASSES
-        return kernels.passes(self.scene.device.is_cpu)
+        return kernels.passes(self.tooled, self.scene.device.is_cpu)
 
     def solve(self, acceleration: wp.array, target: wp.array, impulse: bool) -> None:
         """Enqueue: v from v* = velocity + dt acceleration. What viscosity adds goes to `target`: the accelerations or,
@@ -127,6 +133,8 @@ class ImplicitViscosity:
         common = [scene.dt, scene.phases, pool.phase, pool.held]
         self._particles("open_solve", [*common, *matter], [self.aim, self.trial, self.rows])
         self._over_pairs("fullness")
+        if self.tooled:
+            self._particles("take_along", [self.applying], [self.aim, self.driven])
         self._over_pairs("image")
         if scene.grows:
             self._particles("give_growth", [pool.growth], [self.rows])
@@ -137,6 +145,8 @@ class ImplicitViscosity:
         self.iterations.repeat(self._iterate)
         ends = [scene.dt, pool.held, self.aim, self.trial, self.residual, int(impulse)]
         self._particles("close_solve", ends, [self.drag, target])
+        if self.tooled:
+            self._particles("hand_on", [self.applying, self.driven, int(impulse)], [self.drag, target])
 
     def _iterate(self) -> None:
         """One step of conjugate gradients; `image` is the image K p of the direction p."""

@@ -17,6 +17,7 @@ from .conjugate_warp import KERNELS
 from .images import face_kind, image_velocity
 from .pairs import Pass, floats
 from .smoothing import drag_weight
+from .tool import Tool, felt
 
 wp.set_module_options({"enable_backward": False})
 
@@ -45,6 +46,7 @@ class Applying:
     volume: wp.array(dtype=float)
     rows: wp.array(dtype=wp.vec4)
     image: wp.array(dtype=wp.vec3)
+    tool: Tool
 
 
 @wp.func
@@ -95,6 +97,79 @@ def finish(num: Viscous, box: Box, data: Applying, world: int, i: int, own: floa
     if data.held[i] == FREE:
         image = wp.vec3(own[4], own[5], own[6]) - (data.dt[world] / rest_density(data.mass, data.volume, i)) * sums
     data.image[i] = image
+
+
+@wp.func
+def dragged(data: Applying, world: int, i: int, x: wp.vec3, viscosity: float, fullness: float, v: wp.vec3):
+    """What a rigid body takes from a velocity relative to it, in a step (tool_map.py)."""
+    found = felt(data.tool, x)
+    rest = rest_density(data.mass, data.volume, i)
+    return (10.0 * data.dt[world] * viscosity / (rest * fullness * fullness)) * (found.drag * v)
+
+
+@wp.func
+def tooled_fullness_finish(
+    num: Viscous, box: Box, data: Applying, world: int, i: int, own: floats(DIRECTION + 4), sums: vec1
+):
+    total = sums[0] + felt(data.tool, wp.vec3(own[0], own[1], own[2])).full
+    store_vec4(data.rows, 3 * i + 2, wp.vec4(wp.sqrt(wp.max(total, EMPTIEST)), 1.0, 1.0, 1.0))
+
+
+@wp.func
+def tooled_finish(
+    num: Viscous, box: Box, data: Applying, world: int, i: int, own: floats(DIRECTION + 4), sums: wp.vec3
+):
+    image = wp.vec3(0.0, 0.0, 0.0)
+    if data.held[i] == FREE:
+        v = wp.vec3(own[4], own[5], own[6])
+        image = v - (data.dt[world] / rest_density(data.mass, data.volume, i)) * sums
+        image += dragged(data, world, i, wp.vec3(own[0], own[1], own[2]), own[7], own[8], v)
+    data.image[i] = image
+
+
+@wp.kernel
+def take_along(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    data: Applying,
+    # outputs
+    aim: wp.array(dtype=wp.vec3),
+    driven: wp.array(dtype=wp.vec3),
+):
+    """What a rigid body's own velocity adds to v*."""
+    i = index_of(share, wp.tid())
+    world = i / capacity
+    if i - world * capacity < count[world] and data.held[i] == FREE:
+        row = load_vec4(data.rows, 3 * i)
+        viscosity = load_vec4(data.rows, 3 * i + 1)[3]
+        fullness = load_vec4(data.rows, 3 * i + 2)[0]
+        x = wp.vec3(row[0], row[1], row[2])
+        driven[i] = dragged(data, world, i, x, viscosity, fullness, data.tool.pose.velocity[0])
+        aim[i] = aim[i] + driven[i]
+
+
+@wp.kernel
+def hand_on(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    data: Applying,
+    driven: wp.array(dtype=wp.vec3),
+    impulse: int,
+    # outputs
+    drag: wp.array(dtype=wp.vec3),
+    target: wp.array(dtype=wp.vec3),
+):
+    """The same, to what is handed on."""
+    i = index_of(share, wp.tid())
+    world = i / capacity
+    if i - world * capacity < count[world] and data.held[i] == FREE:
+        change = driven[i]
+        drag[i] = drag[i] + change / data.dt[world]
+        if impulse == 0:
+            change = change / data.dt[world]
+        target[i] = target[i] + change
 
 
 @wp.func
@@ -221,10 +296,12 @@ def close_solve(
 
 
 @cache
-def passes(cpu: bool) -> SimpleNamespace:
-    """The kernels for one kind of device."""
-    image = Pass(Viscous, Applying, DIRECTION, 3, pair, finish, seen=seen).compiled("viscous_image", cpu)
-    fullness = Pass(Viscous, Applying, DIRECTION, 1, fullness_pair, fullness_finish).compiled("viscous_fullness", cpu)
+def passes(tooled: bool, cpu: bool) -> SimpleNamespace:
+    """The kernels for one kind of device, beside a rigid body or without one."""
+    name, ends = ("tooled_", (tooled_fullness_finish, tooled_finish)) if tooled else ("", (fullness_finish, finish))
+    fullness = Pass(Viscous, Applying, DIRECTION, 1, fullness_pair, ends[0]).compiled(f"viscous_{name}fullness", cpu)
+    image = Pass(Viscous, Applying, DIRECTION, 3, pair, ends[1], seen=seen).compiled(f"viscous_{name}image", cpu)
     growing = Pass(Viscous, Applying, DIRECTION, 3, growing_pair, growing_finish, seen=seen_growing)
-    kernels = {kernel.key: kernel for kernel in (open_solve, give_growth, *KERNELS, close_solve)}
+    own = (open_solve, give_growth, *KERNELS, close_solve, *((take_along, hand_on) if tooled else ()))
+    kernels = {kernel.key: kernel for kernel in own}
     return SimpleNamespace(fullness=fullness, image=image, growing=growing.compiled("viscous_growing", cpu), **kernels)

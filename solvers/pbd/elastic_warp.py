@@ -8,6 +8,7 @@ viscosity, and is solved for with Newton's own (../viscosity.py) in place of swe
 stable at any stiffness.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import warp as wp
@@ -24,6 +25,7 @@ from ..flow import pressure, strained
 from ..images import image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import spiky_slope
+from ..tool import Tool, felt, seen_by_tool
 from .numbers import MOVING, PULLING, Numbers
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -48,6 +50,7 @@ class Straining:
     kept: wp.array(dtype=float)
     pulling: wp.array(dtype=wp.vec4)
     pulled: wp.array(dtype=wp.vec3)
+    tool: Tool
 
 
 @wp.kernel
@@ -133,6 +136,23 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
     store_vec4(data.pulling, 4 * i + 3, wp.vec4(stress[2, 2], 0.0, 0.0, 0.0))
 
 
+@wp.func
+def tooled_strain_finish(
+    num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(MOVING + 4), sums: vec15
+):
+    found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
+    if found.on == 1:
+        u = seen_by_tool(data.tool, found, wp.vec3(own[4], own[5], own[6]))
+        for a in range(3):
+            for b in range(3):
+                sums[3 * a + b] -= u[a] * found.own[b]
+            sums[9 + a] -= found.second[a, a]
+        sums[12] -= found.second[0, 1]
+        sums[13] -= found.second[0, 2]
+        sums[14] -= found.second[1, 2]
+    strain_finish(num, box, data, world, i, own, sums)
+
+
 strain = Pass(Numbers, Straining, MOVING, 15, strain_pair, strain_finish, seen=seen_moving)
 """Elastic strain after the substep by the common law, and its stress times the correction of gradients. The volume of
 what flows is the density constraint's; only a solid's is elastic. Sums: velocity gradient (9), moment (6)."""
@@ -167,8 +187,25 @@ def pull_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, own
         data.pulled[i] = sums / rest_density(data.mass, data.volume, i)
 
 
+@wp.func
+def tooled_pull_finish(
+    num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(PULLING + 4), sums: wp.vec3
+):
+    found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
+    pulled = 2.0 * stress_of(own, 4) * found.first
+    if data.tool.slips == 1:
+        pulled = wp.dot(pulled, found.normal) * found.normal
+    pull_finish(num, box, data, world, i, own, sums + pulled)
+
+
 pull = Pass(Numbers, Straining, PULLING, 3, pull_pair, pull_finish, seen=seen_pulling)
 """Acceleration by the stress of the particle and its neighbours."""
 
 KERNELS = (pack,)
-ELASTIC = {"strain": strain, "pull": pull}
+
+
+def elastic(tooled: bool) -> dict[str, Pass]:
+    """The passes, beside a rigid body or without one."""
+    if not tooled:
+        return {"strain": strain, "pull": pull}
+    return {"strain": replace(strain, finish=tooled_strain_finish), "pull": replace(pull, finish=tooled_pull_finish)}

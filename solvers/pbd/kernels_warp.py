@@ -6,6 +6,7 @@ What is elastic answers strain by the common law (elastic_warp.py), implicit in 
 """
 
 import functools
+from dataclasses import replace
 from types import SimpleNamespace
 
 import warp as wp
@@ -20,7 +21,8 @@ from ..bind import warp_func
 from ..images import WALL_INSET, contained
 from ..pairs import Pass, floats
 from ..smoothing import cusp
-from .elastic_warp import ELASTIC, KERNELS, sloping
+from ..tool import Tool, felt, outside
+from .elastic_warp import KERNELS, elastic, sloping
 from .numbers import PLACE, PUSH, Numbers
 from .walls import pushed, wall_friction
 
@@ -90,6 +92,7 @@ class Constraining:
     pushes: wp.array(dtype=wp.vec4)
     fill: wp.array(dtype=float)
     correction: wp.array(dtype=wp.vec3)
+    tool: Tool
 
 
 @wp.func
@@ -128,6 +131,17 @@ def multiplier_finish(
     store_vec4(data.pushes, 2 * i + 1, wp.vec4(multiplier, heft, 0.0, 0.0))
 
 
+@wp.func
+def tooled_multiplier_finish(
+    num: Numbers, box: Box, data: Constraining, world: int, i: int, own: floats(PLACE + 4), sums: vec5
+):
+    found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
+    together = num.slope_weight * found.first
+    squares = num.slope_weight * num.slope_weight * found.squares
+    sums += vec5(found.level, together[0], together[1], together[2], squares)
+    multiplier_finish(num, box, data, world, i, own, sums)
+
+
 multipliers = Pass(Numbers, Constraining, PLACE, 5, multiplier_pair, multiplier_finish)
 """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper). What has strength
 and flows is drawn together, too.
@@ -153,6 +167,14 @@ def correct_finish(
 ):
     if data.held[i] == FREE:
         data.correction[i] = (num.over_relaxation * num.spacing * num.spacing) * sums
+
+
+@wp.func
+def tooled_correct_finish(
+    num: Numbers, box: Box, data: Constraining, world: int, i: int, own: floats(PUSH + 4), sums: wp.vec3
+):
+    found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
+    correct_finish(num, box, data, world, i, own, sums + (2.0 * own[4] * num.slope_weight) * found.first)
 
 
 correct = Pass(Numbers, Constraining, PUSH, 3, correct_pair, correct_finish)
@@ -234,20 +256,46 @@ def follow(
         position[i] = contained(box, free, WALL_INSET * num.spacing)
 
 
+@wp.kernel
+def keep_out(
+    share: wp.vec3i,
+    tool: Tool,
+    capacity: int,
+    count: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    volume: wp.array(dtype=float),
+    # outputs
+    position: wp.array(dtype=wp.vec3),
+    motion: wp.array(dtype=wp.vec3),
+    places: wp.array(dtype=wp.vec4),
+):
+    """What would enter a rigid body stays in front of it."""
+    i = index_of(share, wp.tid())
+    if i % capacity < count[i / capacity] and held[i] == FREE:
+        x = outside(tool, position[i])
+        motion[i] = motion[i] + x - position[i]
+        position[i] = x
+        store_vec4(places, i, wp.vec4(x[0], x[1], x[2], volume[i]))
+
+
 @functools.cache
-def passes(cpu: bool) -> SimpleNamespace:
-    """The passes for one kind of device."""
-    over_pairs = {
-        "multipliers": multipliers,
-        "correct": correct,
-        **ELASTIC,
-    }
+def passes(tooled: bool, cpu: bool) -> SimpleNamespace:
+    """The passes for one kind of device, beside a rigid body or without one."""
+    over_pairs = {"multipliers": multipliers, "correct": correct}
+    if tooled:
+        over_pairs = {
+            "multipliers": replace(multipliers, finish=tooled_multiplier_finish),
+            "correct": replace(correct, finish=tooled_correct_finish),
+        }
+    over_pairs |= elastic(tooled)
+    name = "tooled_" * tooled
     return SimpleNamespace(
         predict=predict,
         apply=apply,
         velocities=velocities,
         follow=follow,
         wall_friction=wall_friction,
+        **({"keep_out": keep_out} if tooled else {}),
         **{kernel.key: kernel for kernel in KERNELS},
-        **{name: one.compiled(name, cpu) for name, one in over_pairs.items()},
+        **{key: one.compiled(name + key, cpu) for key, one in over_pairs.items()},
     )

@@ -18,12 +18,14 @@ from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
 
 from .. import aging
-from ..backends import backend_of
+from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import cusp, spiky
+from ..smoothing import cusp, drag_over, spiky, spiky_slope
+from ..tool import tool_of
+from ..tool_map import Weights
 from ..viscosity import ImplicitViscosity, Tolerance, accuracy
 from . import kernels_warp as kernels
 from .elasticity import Elasticity
@@ -49,6 +51,16 @@ SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
 WAVE = 0.1  # of the time that a wave takes across the narrowest of a solid, that a step may take
 
 
+def weights(support: float) -> Weights:
+    """Of what the passes sum over partners: grad W, viscous drag, and the density; support [m]."""
+    return Weights(
+        slope=lambda r: spiky_slope(r, support) / r,
+        drag=lambda r: drag_over(r, support),
+        full=lambda r: drag_over(r, support) * r**4 / 3.0,
+        level=lambda r: cusp(r, support),
+    )
+
+
 class SolverPBD(Solver):
     """Position-based fluids: density constraints, and the common law's stress and viscosity, implicit in time."""
 
@@ -58,6 +70,7 @@ class SolverPBD(Solver):
     shares_threads = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
+    lacking: ClassVar = LACKING
     Config: ClassVar = ConfigPBD
     faults: ClassVar = {
         FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full",
@@ -162,12 +175,19 @@ class SolverPBD(Solver):
         self.constraining.correction = self.correction
         self.constraining.pushes, self.constraining.fill = self.pushes, self.fill
         self.elastic = Elasticity(scene, pool) if scene.elastic else None
+        self.tool = None if scene.outline is None else tool_of(scene, self.num.support, weights(self.num.support))
+        if self.tool is not None:
+            self.constraining.tool = self.tool
+            if self.elastic is not None:
+                self.elastic.straining.tool = self.tool
         self.order = side_by_side(scene, pool)
         self.viscosity = None
         if scene.viscous or self.elastic is not None:
             support, tolerance = self.num.support, config.viscous_tolerance
             kept = None if self.elastic is None else self.elastic.kept
-            self.viscosity = ImplicitViscosity(scene, pool, self.backend, self.neighbours, support, tolerance, kept)
+            self.viscosity = ImplicitViscosity(
+                scene, pool, self.backend, self.neighbours, support, tolerance, kept, self.tool
+            )
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language."""
@@ -175,7 +195,7 @@ class SolverPBD(Solver):
             from . import kernels_taichi
 
             return kernels_taichi.PASSES
-        return kernels.passes(self.scene.device.is_cpu)
+        return kernels.passes(self.scene.outline is not None, self.scene.device.is_cpu)
 
     def refresh(self) -> None:
         self.neighbours.refresh()
@@ -250,6 +270,13 @@ class SolverPBD(Solver):
             [self.num, scene.box, *self._active(), scene.dt, scene.force, pool.held, *matter, pulled],
             [pool.position, self.motion, self.places, pool.fault],
         )
+        self.keep_out()
+
+    def keep_out(self) -> None:
+        pool = self.pool
+        if self.tool is not None:
+            outputs = [pool.position, self.motion, self.places]
+            self._launch(self.kernels.keep_out, [self.tool, *self._active(), pool.held, pool.volume], outputs)
 
     def lists(self) -> None:
         self.neighbours.update()
@@ -272,6 +299,7 @@ class SolverPBD(Solver):
             [self.num, self.scene.box, *self._active(), pool.held, self.correction, pool.volume],
             [pool.position, self.motion, self.places, pool.fault],
         )
+        self.keep_out()
 
     def velocities(self) -> None:
         pool = self.pool
@@ -289,6 +317,7 @@ class SolverPBD(Solver):
         pool, scene = self.pool, self.scene
         inputs = [self.num, scene.box, *self._active(), scene.dt, pool.held, pool.drag]
         self._launch(self.kernels.follow, inputs, [pool.position])
+        self.keep_out()
 
     def pack(self) -> None:
         assert self.elastic is not None

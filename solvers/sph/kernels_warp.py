@@ -23,6 +23,7 @@ from ..flow import pressure, shear_rate, strained
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
+from ..tool import Tool, felt, keep_out, seen_by_tool
 from .particle import Smoothing, broken, drifted, off_linear, out_of_crowd, pulled_back
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -56,6 +57,7 @@ class Straining:
     state: wp.array(dtype=wp.vec4)  # rows of `force`
     shift: wp.array(dtype=wp.vec3)
     fault: wp.array(dtype=int)
+    tool: Tool
 
 
 @wp.struct
@@ -68,6 +70,7 @@ class Forcing:
     forces: wp.array(dtype=Force)
     new_density: wp.array(dtype=float)
     acceleration: wp.array(dtype=wp.vec3)
+    tool: Tool
 
 
 @wp.kernel
@@ -105,17 +108,18 @@ def seen_matter(box: Box, data: Straining, row: floats(MATTER), j: int, code: in
 
 
 @functools.cache
-def passes(strength: bool, viscous: bool, changing: bool, cpu: bool) -> SimpleNamespace:
-    """The passes for materials with or without shear stiffness, viscosity, and parameters or rest densities that differ
-    between particles: unused physics costs nothing."""
+def passes(strength: bool, viscous: bool, changing: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
+    """The passes for materials with or without shear stiffness, viscosity, parameters or rest densities that differ
+    between particles, and a rigid body that is carried along: unused physics costs nothing."""
     name = f"{'strength' if strength else 'liquid'}_{'viscous' if viscous else 'inviscid'}"
-    name += "_changing" if changing else ""
-    strain = strain_pass(strength, changing).compiled(f"strain_{name}", cpu)
-    force = force_pass(strength, viscous, changing).compiled(f"force_{name}", cpu)
-    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move)
+    name += "_changing" * changing + "_tooled" * tooled
+    strain = strain_pass(strength, changing, tooled).compiled(f"strain_{name}", cpu)
+    force = force_pass(strength, viscous, changing, tooled).compiled(f"force_{name}", cpu)
+    kept_out = {"keep_out": keep_out} if tooled else {}
+    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **kept_out)
 
 
-def strain_pass(strength: bool, changing: bool) -> Pass:
+def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
     """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
@@ -160,6 +164,29 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
             return Sums(spread, m[0], m[1], m[2], crowd[0], crowd[1], crowd[2], -w * r2, w * ur, sheared)
 
     @wp.func
+    def into_tool(tool: Tool, own: Own, sums: Sums):
+        """The sums, gone on with into a rigid body (../tool_map.py)."""
+        found = felt(tool, wp.vec3(own[0], own[1], own[2]))
+        if found.on == 1:
+            rho = own[7]
+            u = rho * seen_by_tool(tool, found, wp.vec3(own[4], own[5], own[6]))
+            for a in range(3):
+                sums[1 + a] += rho * found.first[a]
+            if wp.static(strength):
+                for a in range(3):
+                    for b in range(3):
+                        sums[7 + 3 * a + b] -= u[a] * found.own[b]
+                    sums[16 + a] -= rho * found.second[a, a]
+                    sums[22 + a] += u[a] * found.zeroth
+                sums[19] -= rho * found.second[0, 1]
+                sums[20] -= rho * found.second[0, 2]
+                sums[21] -= rho * found.second[1, 2]
+            else:
+                sums[7] -= rho * wp.trace(found.second)
+                sums[8] += wp.dot(u, found.own)
+        return sums
+
+    @wp.func
     def finish(num: Smoothing, box: Box, data: Straining, world: int, i: int, own: Own, sums: Sums):
         phase = data.phases[world, data.phase_of[i]]
         h = data.dt[world]
@@ -168,6 +195,8 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
         if wp.static(changing):
             rest = own[11]
             sound = phase.wave_speed * wp.sqrt(phase.density / rest)
+        if wp.static(tooled):
+            sums = into_tool(data.tool, own, sums)
         spread = sums[0]
         first_moment = wp.vec3(sums[1], sums[2], sums[3])
         crowd = wp.vec3(sums[4], sums[5], sums[6])
@@ -247,7 +276,7 @@ def strain_pass(strength: bool, changing: bool) -> Pass:
     return Pass(Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter)
 
 
-def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
+def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> Pass:
     """Momentum: pressure or stress, artificial and Newtonian viscosity. Sums: what pushes (3), and what pushes across
     friction walls (3), which never pull and rub by Coulomb's law."""
     N = width = STATE[strength, changing]
@@ -327,6 +356,34 @@ def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
         return Sums(sums[0] - x, sums[1] - y, sums[2] - z, x, y, z)
 
     @wp.func
+    def by_tool(num: Smoothing, data: Forcing, world: int, i: int, own: Own, others: wp.vec3):
+        """The acceleration by a rigid body, beside that by others: its stress is the particle's own, and its drag is
+        implicit in time, for beside the surface it is stiffer than any between particles."""
+        a = wp.vec3(0.0, 0.0, 0.0)
+        found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
+        if found.on == 1:
+            rho, h = data.new_density[i], data.dt[world]
+            both = 2.0 * rho * found.first
+            if wp.static(changing):
+                both *= 1.0 / (rho * rho)
+            if wp.static(strength):
+                a = wp.mat33(own[7], own[8], own[9], own[10], own[11], own[12], own[13], own[14], own[15]) * both
+            else:
+                a = -own[7] * both
+            if data.tool.slips == 1:
+                a = wp.dot(a, found.normal) * found.normal
+            if wp.static(viscous):
+                phase = data.phases[world, data.phase_of[i]]
+                rest = float(phase.density)
+                if wp.static(changing):
+                    rest = own[LAST + 1]
+                drag = 10.0 * num.viscous_lattice * phase.viscosity / (rest * rest) * rho
+                u = wp.vec3(own[4], own[5], own[6]) + h * (a + others) - found.velocity
+                still = wp.identity(n=3, dtype=float) - (h * drag) * found.drag
+                a += (wp.inverse(still) * u - u) / h
+        return a
+
+    @wp.func
     def finish(num: Smoothing, box: Box, data: Forcing, world: int, i: int, own: Own, sums: Sums):
         x = wp.vec3(own[0], own[1], own[2])
         a = wp.vec3(sums[0], sums[1], sums[2])
@@ -345,6 +402,8 @@ def force_pass(strength: bool, viscous: bool, changing: bool) -> Pass:
                 grip = wp.min(friction * normal, speed / h)
                 a -= (grip / wp.max(speed, 1.0e-12)) * slide
                 a[axis] = a[axis] + inward * normal
+        if wp.static(tooled):
+            a += by_tool(num, data, world, i, own, a + pull)
         data.acceleration[i] = a + pull
 
     return Pass(Smoothing, Forcing, width, 6, pair, finish, begin, seen, held)

@@ -17,15 +17,17 @@ from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
 
 from .. import aging
-from ..backends import backend_of
+from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import wendland, wendland_slope
+from ..smoothing import drag_over, wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
+from ..tool import tool_of
+from ..tool_map import Weights
 from ..viscosity import WORTH, ImplicitViscosity, accuracy, decided
 from . import kernels_warp as kernels
 from .config import ConfigSPH
@@ -46,6 +48,15 @@ def crowding(r: float, d: float, h: float) -> float:
     return d**3 * -wendland_slope(r / h, h) * r * excess
 
 
+def weights(h: float, implicit: bool) -> Weights:
+    """Of what the passes sum over partners: grad W, and viscous drag by either scheme; h [m]."""
+
+    def drag(r: float) -> float:
+        return drag_over(r, 2.0 * h) if implicit else wendland_slope(r / h, h) / (r**2 + 1e-4 * h**2)
+
+    return Weights(lambda r: wendland_slope(r / h, h), drag, lambda r: drag_over(r, 2.0 * h) * r**4 / 3.0)
+
+
 class SolverSPH(Solver):
     """WCSPH with Wendland C2 kernel, delta-SPH density diffusion, mirror-image walls, symplectic Euler."""
 
@@ -55,6 +66,7 @@ class SolverSPH(Solver):
     shares_threads = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
+    lacking: ClassVar = LACKING
     Config: ClassVar = ConfigSPH
     passes = ("lists", "pack", "strain", "force", "drag", "move")
     OWN: ClassVar = ("matter", "new_density", "state", "shift", "acceleration")
@@ -185,21 +197,27 @@ class SolverSPH(Solver):
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
         self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
+        self.tool = (
+            None if scene.outline is None else tool_of(scene, 2.0 * self.num.h, weights(self.num.h, self.implicit))
+        )
         self._bring_together()
         self.order = side_by_side(scene, pool)
         self.viscosity = None
         if self.implicit:
             support, tolerance = 2.0 * self.num.h, config.viscous_tolerance
-            self.viscosity = ImplicitViscosity(scene, pool, self.backend, self.neighbours, support, tolerance)
+            self.viscosity = ImplicitViscosity(
+                scene, pool, self.backend, self.neighbours, support, tolerance, tool=self.tool
+            )
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
-        variant = self.scene.elastic, self.scene.viscous and not self.implicit, self.scene.changes
+        scene = self.scene
+        variant = scene.elastic, scene.viscous and not self.implicit, scene.changes
         if backend == "taichi":
             from . import kernels_taichi
 
             return kernels_taichi.passes(*variant)
-        return kernels.passes(*variant, self.scene.device.is_cpu)
+        return kernels.passes(*variant, scene.outline is not None, scene.device.is_cpu)
 
     def _bring_together(self) -> None:
         """What the passes over pairs read and write, as they take it."""
@@ -208,6 +226,8 @@ class SolverSPH(Solver):
         for data in (self.straining, self.forcing):
             data.dt, data.phases, data.phase_of = scene.dt, scene.phases, pool.phase
             data.new_density = self.new_density
+            if self.tool is not None:
+                data.tool = self.tool
         self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
         self.straining.shift = self.shift
         self.straining.growth = self.growth
@@ -310,6 +330,10 @@ class SolverSPH(Solver):
             ],
             [pool.position, pool.velocity, pool.density, pool.carried_gradient, pool.fault],
         )
+
+        if self.tool is not None:
+            inputs = [self.tool, pool.capacity, pool.count, pool.held]
+            self.backend.launch(self.kernels.keep_out, pool.size, inputs, [pool.position])
 
     def prepare(self) -> None:
         if self.scene.changes:
