@@ -16,11 +16,15 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
+# How viscosity is taken in a step, `drags`: solved for; as a stress; the same, under a pressure that a piston holds.
+IMPLICIT, EXPLICIT, PRESSED = wp.constant(0), wp.constant(1), wp.constant(2)
 # Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
 # they share: a beam falls slowly off it.
 ANCHOR = wp.constant(1.0e4)
 STEEPEST = wp.constant(1.0 / 6.0)  # D dt / dx^2 up to which explicit diffusion is stable in three dimensions
-ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
+# Crowding on the grid that only clamps can make [-]; that only a piston can, which at some height over the nodes makes
+# any, and would shift what it lets go all the time.
+ANCHORED, DRIVEN = wp.constant(10.0), wp.constant(1.5)
 PACKED = wp.constant(2.0)  # volume ratio, or one over it, beyond which nothing is let go [-]
 
 
@@ -98,12 +102,13 @@ def inertia(
     """With which a particle takes part in the momentum of its nodes [kg].
 
     What is carried gives its nodes its momentum anew in every step: that pushes as long as viscosity drags on them for
-    no longer than an explicit step. Where it is solved for (drags = 0) the piston lies as far above the exit as nodes
-    reach and yields to nothing; what is carried below it passes its push on by the pressure and viscosity of a liquid.
+    no longer than an explicit step, and nothing resists but matter that is free. Elsewhere the piston lies as far above
+    the exit as nodes reach and yields to nothing; what is carried below it passes its push on by the pressure and
+    viscosity of a liquid.
     (Not beneath a ceiling whose nodes it would share: these do not move.)
     """
     heavy = held == CLAMPED
-    if held == CARRIED and drags == 0:
+    if held == CARRIED and drags != EXPLICIT:
         reach = 1.5 * grid.dx[2]
         heavy = x[2] > exit[row[0]][2] + reach and x[2] < grid.upper[2] - reach
     return wp.where(heavy, ANCHOR * mass, mass)
@@ -153,18 +158,18 @@ def stressed(
     b = elastic_normal[p]
     s = elastic_shear[p]
     a = wp.mat33()
-    if held[p] == FREE:
+    if held[p] == FREE or (held[p] == CARRIED and drags == PRESSED):
         a = columns_scaled(m * near_walls(grid, x, c), grid.dx)
-    if held[p] != CARRIED and on and dt > 0.0:
+    if (held[p] != CARRIED or drags == PRESSED) and on and dt > 0.0:
         j *= wp.max(1.0 + dt * wp.trace(c), 0.1)
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
             b, s, _kept = strained(phase, phase.shear_modulus, c, b, s, dt)
             elastic_normal[p] = b
             elastic_shear[p] = s
-    if on and dt > 0.0 and (held[p] != CARRIED or drags == 0):
+    if on and dt > 0.0 and (held[p] != CARRIED or drags != EXPLICIT):
         tau = kirchhoff(phase, j, b, s)
-        if drags == 1 and phase.viscosity > 0.0:
+        if drags != IMPLICIT and phase.viscosity > 0.0:
             tau += viscous(phase, j, c)
         a -= resistance_of(grid, dt, volume[p], tau)
     return a
@@ -213,7 +218,7 @@ def taken(
     if held[p] == FREE:
         v = gathered
         velocity[p] = v
-    elif held[p] == CARRIED and v[2] < 0.0:
+    elif held[p] == CARRIED and v[2] < 0.0 and pitch > 0.0:
         # the grid's speed beyond its own, half a spacing above the outlet: from there on its own gradient tells
         ahead = gathered[2] + gradient[2, 2] * (exit[row[0]][2] + 0.5 * pitch - x[2]) - v[2]
         j = volume_ratio[p]
@@ -223,16 +228,26 @@ def taken(
 
 
 @wp.func
-def shifted(grid: Grid, phase: Phase, sums: wp.mat44, c: wp.mat33, step: float, volume_ratio: float, held: int):
+def shifted(
+    grid: Grid,
+    phase: Phase,
+    sums: wp.mat44,
+    c: wp.mat33,
+    step: float,
+    pitch: float,
+    volume_ratio: float,
+    held: int,
+):
     """How far a particle is shifted out of a crowd [m]: -step |2 dev D| dx^2 grad(rho) / rho0, where rho J > rho0.
 
     Matter that is stretched beyond the width of a cell leaves gaps between its particles that no stress holds open,
     and its volume is lost. Shifting fills them (Fick's law, Lind et al. 2012), in proportion to the strain that makes
-    them: what rests, flies or turns is left alone.
+    them: what rests, flies or turns is left alone. `pitch` is 0 where a piston drives.
     """
     by = wp.vec3(0.0, 0.0, 0.0)
     crowding = sums[0, 3] * volume_ratio / phase.density
-    if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
+    most = wp.where(pitch > 0.0, ANCHORED, DRIVEN)
+    if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < most:
         # 4 sum w rho (x_i - x) is dx^2 grad(rho)
         by = -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / phase.density) * wp.cw_mul(
             wp.vec3(sums[1, 3], sums[2, 3], sums[3, 3]), grid.dx

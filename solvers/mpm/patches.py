@@ -255,7 +255,9 @@ def gather(
             c = affine_of(grid, sums)
             affine[p] = c
             v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
-            x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
+            x += shifted(
+                grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], pitch, volume_ratio[p], held[p]
+            )
             after = moved(grid, x, v, dt[world], p, position, velocity, fault)
             if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
                 activate_stencil(grid, world, after, table, block_of, active, fault)

@@ -19,7 +19,7 @@ from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
 
 from .. import aging
-from ..backends import backend_of
+from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..order import CellOrder
@@ -30,7 +30,9 @@ from . import kernels_warp as kernels
 from .by_block import ByBlock
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
 from .implicit import GridViscosity
-from .particle import FAULT_STENCIL
+from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
+from .pressed import roughly_pressed, unpressed
+from .tool import Held
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
 ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
@@ -61,6 +63,7 @@ class SolverMPM(Solver):
     shares_threads = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
+    lacking: ClassVar = LACKING
     Config: ClassVar = ConfigMPM
     passes = ("clear_grid", "p2g", "grid_step", "g2p")
     faults: ClassVar = {
@@ -77,16 +80,23 @@ class SolverMPM(Solver):
 
     @classmethod
     def decided(cls, scenario: Scenario, config: Any) -> Any:
-        return decided(cls, scenario, config, math.inf if scenario.domain.rubs else WORTH)
+        only = scenario.domain.rubs or scenario.outline is not None
+        return decided(cls, scenario, config, math.inf if only else WORTH)
 
     @classmethod
     def refuses(cls, scenario: Scenario, config: Any) -> str | None:
         blocks = blocks_of(scenario.domain, config.grid_ratio * scenario.spacing)
         if blocks > MAX_BLOCKS:
             return f"the domain holds {blocks:.3g} grid blocks; use a smaller domain or a larger spacing"
+        if reason := unpressed(scenario, config):
+            return reason
         if config.viscosity == "implicit" and scenario.domain.rubs:
             return "its walls have friction, which implicit viscosity knows nothing of; use viscosity = 'explicit'"
         return None
+
+    @classmethod
+    def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
+        return roughly_pressed(scenario, config)
 
     @classmethod
     def memory(cls, scenario: Scenario, config: Any, particles: int) -> float:
@@ -161,6 +171,7 @@ class SolverMPM(Solver):
         self.by_block = ByBlock(scene, pool, slots, implicit) if scene.device.is_cpu and backend == "warp" else None
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
+        self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots)
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
@@ -236,7 +247,14 @@ class SolverMPM(Solver):
 
     def scatter(self, dt: wp.array, raw: wp.array) -> None:
         """Strain and stress within dt, momentum and mass to nodes that are empty."""
-        pool, scene, drags = self.pool, self.scene, int(self.viscosity is None)
+        drags = int(EXPLICIT if self.held is None else PRESSED) if self.viscosity is None else int(IMPLICIT)
+        self.give(dt, drags, raw)
+        if self.held is not None:
+            self.held.reflect(dt, self.table, raw)
+
+    def give(self, dt: wp.array, drags: int, raw: wp.array) -> None:
+        """The same, of particles themselves."""
+        pool, scene = self.pool, self.scene
         hours = scene.clock.hours
         if self.by_block is not None:
             self.by_block.p2g(self.grid, self.table, self.block_of, self.active, dt, drags, raw)
@@ -291,10 +309,18 @@ class SolverMPM(Solver):
         )
 
     def g2p(self) -> None:
+        self.gather()
+        if self.held is not None:
+            homes = None if self.by_block is None else self.by_block.homes
+            self.held.keep_out(self.table, self.block_of, self.active, homes)
+            self.empty(self.held.nodes)
+            self.held.level(self.table)
+
+    def gather(self) -> None:
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
         if self.by_block is not None:
             blocks = self.table, self.block_of, self.active
-            self.by_block.g2p(self.grid, self.moving, self.shifting, *blocks)
+            self.by_block.g2p(self.grid, self.moving, self.shifting, 0.0 if self.held else scene.spacing, *blocks)
             return
         self._launch(
             "g2p",
@@ -309,7 +335,7 @@ class SolverMPM(Solver):
                 pool.phase,
                 pool.held,
                 self.shifting,
-                scene.spacing,
+                0.0 if self.held else scene.spacing,
                 hours.row,
                 hours.exit,
             ],

@@ -1,0 +1,45 @@
+"""Whether MPM can press matter through a rigid body."""
+
+from typing import Any
+
+from fluidbench.scenario import Scenario
+from fluidbench.scenario.stream import COLUMN
+
+from .grid import cells_of
+
+ACROSS = 8.0  # cells across a bore: with fewer its resistance is off by more than 10 %
+
+
+def unpressed(scenario: Scenario, config: Any) -> str | None:
+    """Why it cannot: its images (tool.py) would shake, or what feeds the bore would not push (`inertia` in
+    particle.py). None where it can, or there is no body."""
+    if (fed_from := scenario.fed_from) is None:
+        return None
+    for wrong, what in (
+        (not scenario.sticks, "slips along it"),
+        (any(m.elastic for m in scenario.aged[1]), "is elastic or yields"),
+        (config.viscosity == "implicit", "has its viscosity solved for (use viscosity = 'explicit')"),
+    ):
+        if wrong:
+            return f"its flow along a body is not stable for matter that {what}"
+    dx = float(cells_of(scenario.domain, config.grid_ratio * scenario.spacing)[1][2])
+    if (COLUMN - 0.5) * scenario.spacing < 1.5 * dx:
+        return f"its cells ({dx:.3g} m) are too large to feed a bore; use numerics.mpm.grid_ratio = 1"
+    top = fed_from + 1.5 * dx
+    if scenario.domain.upper[2] < top:
+        return (
+            f"what it feeds a bore with reaches up to {top:.4g} m, and the domain ends at "
+            f"{scenario.domain.upper[2]:.4g} m; raise domain.upper"
+        )
+    return None
+
+
+def roughly_pressed(scenario: Scenario, config: Any) -> list[str]:
+    """What a coarse grid makes of a bore."""
+    cells = scenario.narrowest / (config.grid_ratio * scenario.spacing)
+    if scenario.fed_from is None or cells >= ACROSS:
+        return []
+    return [
+        f"what it presses through is {cells:.2g} cells wide: below {ACROSS:g} its resistance is off by more than 10 %; "
+        "use numerics.mpm.grid_ratio = 1 or a smaller spacing"
+    ]
