@@ -246,7 +246,9 @@ def shifted(
     """
     by = wp.vec3(0.0, 0.0, 0.0)
     crowding = sums[0, 3] * volume_ratio / phase.density
-    most = wp.where(pitch > 0.0, ANCHORED, DRIVEN)
+    most = float(ANCHORED)
+    if pitch <= 0.0:
+        most = float(DRIVEN)
     if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < most:
         # 4 sum w rho (x_i - x) is dx^2 grad(rho)
         by = -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / phase.density) * wp.cw_mul(
