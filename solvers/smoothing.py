@@ -27,13 +27,6 @@ def drag_weight(q: float, support: float):
     return 339.204 / s * t * t * t * sqrt(t) * q * q  # in this order 0 for what lies ever so far
 
 
-def drag_over(r: float, support: float):
-    """w(r) / r^2 of `drag_weight` [1/m^7]."""
-    t = max(1.0 - r / support, 0.0)
-    s = support * support * support * support * support * support * support
-    return 339.204 / s * t * t * t * sqrt(t)
-
-
 def cusp(r: float, support: float):
     """Quadratic kernel [1/m^3], support H: a peak that keeps particles from clumping, as a density's weight. Clavet et
     al. 2005."""

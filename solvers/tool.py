@@ -1,5 +1,7 @@
 """A rigid body that matter flows along, as particles feel it: the tables of tool_map.py, where it is now."""
 
+from typing import Any
+
 import warp as wp
 
 from fluidbench.method.frame import FREE
@@ -13,7 +15,6 @@ wp.set_module_options({"enable_backward": False})
 
 FOURS = wp.constant(QUADS)
 NEAREST = 0.25  # spacings in front of the surface, nearer than which nothing is taken to be for its velocity
-SAME = wp.constant(1.0)  # in insets: depths that are one
 INSET = 0.2  # closest approach to it [spacings]; at rest the first layer is at 0.5
 
 
@@ -63,6 +64,11 @@ def tool_of(scene: Scene, reach: float, weights: Weights | None = None) -> Tool:
     tool.slips = int(outline.slips)
     tool.table = wp.array(found.table.reshape(-1, 4), dtype=wp.vec4, device=scene.device)
     return tool
+
+
+def table_of(tool: Any) -> dict[str, int]:
+    """Bytes that a body takes on the device, if there is one."""
+    return {} if tool is None else {"tool.table": tool.table.capacity}
 
 
 @wp.func
@@ -163,7 +169,7 @@ def mirrored(tool: Tool, x: wp.vec3, reach: float):
             behind, f, g, _out = cell_of_table(tool, image)
             if behind >= 0:
                 depth = -entry(tool, behind, f, g, 0)[0]
-                if wp.abs(depth - gap) < SAME * tool.inset:
+                if wp.abs(depth - gap) < tool.inset:
                     away, mirror = x - place_of(tool.pose), image - place_of(tool.pose)
                     radius = wp.sqrt(away[0] * away[0] + away[1] * away[1])
                     fill = wp.sqrt(mirror[0] * mirror[0] + mirror[1] * mirror[1]) / wp.max(radius, tool.inset)

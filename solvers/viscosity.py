@@ -40,6 +40,8 @@ from . import viscosity_warp as kernels
 from .backends import Backend
 from .conjugate import Iterations
 from .conjugate_warp import CHUNK
+from .smoothing import drag_weight
+from .tool_map import Radial
 
 Scheme = Literal["auto", "explicit", "implicit"]
 Tolerance = Annotated[float, Field(gt=0, le=1e-2, description="residual of implicit viscosity, over the velocity")]
@@ -77,10 +79,18 @@ def accuracy(scenario: Scenario) -> Bound:
     )
 
 
+def beside(support: float) -> dict[str, Radial]:
+    """Of matter in a rigid body, as far as the `support` [m]: drag, and what it adds to fullness (tool_map.py)."""
+    return {
+        "drag": lambda r: drag_weight(r / support, support) / (r * r),
+        "full": lambda r: drag_weight(r / support, support) * r * r / 3.0,
+    }
+
+
 class ImplicitViscosity:
     """What solves for the velocity of a pool under its viscosity; one a solver, everything allocated at once."""
 
-    OWN: ClassVar[tuple[str, ...]] = ("rows", "aim", "trial", "image", "residual", "partial")
+    OWN: ClassVar[tuple[str, ...]] = ("rows", "aim", "trial", "image", "residual", "partial", "driven")
 
     def __init__(
         self,
@@ -114,9 +124,9 @@ class ImplicitViscosity:
         self.applying = kernels.Applying()
         self.applying.dt, self.applying.held, self.applying.image = scene.dt, pool.held, self.image
         self.applying.mass, self.applying.volume, self.applying.rows = pool.mass, pool.volume, self.rows
+        self.driven = wp.zeros(pool.size * self.tooled, dtype=wp.vec3, device=scene.device)
         if tool is not None:
             self.applying.tool = tool
-            self.driven = wp.zeros(pool.size, dtype=wp.vec3, device=scene.device)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         if backend == "taichi":

@@ -20,7 +20,6 @@ class Bead:
     width: np.ndarray  # [m]
     height: np.ndarray  # [m]
     area: np.ndarray  # [m^2]
-    contact: np.ndarray  # width on the floor [m]
     middle: Section
     laid: float = 1.0  # share of the path that the nozzle has come
 
@@ -64,7 +63,7 @@ def measure_bead(deposit: Deposit, scenario: Scenario, laid: float = 1.0) -> Bea
         cut(deposit, p, legs[i], reach, height, scenario.domain.lower[2])
         for p, i in zip(points, leg_at(scenario, station), strict=True)
     ]
-    columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area", "contact"))
+    columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area"))
     return Bead(station, *columns, middle=sections[int(laid * (len(station) // 2))], laid=laid)
 
 

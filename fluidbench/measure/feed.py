@@ -15,13 +15,20 @@ if TYPE_CHECKING:
 FITTED = (0.25, 0.9)  # share of the bore over which pressure is taken to be linear: away from its mouth and its feed
 
 
+def from_exit(frame: Frame, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """Height above the nozzle's exit and distance from its axis of every particle, each of shape (n,) [m]."""
+    assert scenario.track is not None
+    away = frame["position"].astype(float) - scenario.track.at(float(frame["time"]))
+    return away[:, 2], np.hypot(away[:, 0], away[:, 1])
+
+
 def is_out(frame: Frame, scenario: Scenario) -> np.ndarray:
     """Which particles have left the nozzle, shape (n,): neither carried nor in the bore of a body."""
     out = frame["held"] != CARRIED
     if scenario.track is None or scenario.nozzle is None or scenario.nozzle.rise == 0.0:
         return out
-    away = frame["position"] - scenario.track.at(float(frame["time"]))
-    return out & ~((away[:, 2] > 0.0) & (np.hypot(away[:, 0], away[:, 1]) < scenario.nozzle.diameter / 2.0))
+    height, radius = from_exit(frame, scenario)
+    return out & ~((height > 0.0) & (radius < scenario.nozzle.diameter / 2.0))
 
 
 def feeding(frame: Frame, scenario: Scenario) -> dict[str, float]:
@@ -30,14 +37,15 @@ def feeding(frame: Frame, scenario: Scenario) -> dict[str, float]:
     nozzle, track = scenario.nozzle, scenario.track
     if nozzle is None or track is None or nozzle.rise == 0.0 or "pressure" not in frame:
         return {}
-    if float(frame["time"]) > track.end:
+    before, now = track.extruded(np.array([-scenario.schedule[0], 0.0]) + float(frame["time"]))
+    if now == before:
         return {}
-    away = frame["position"] - track.at(float(frame["time"]))
-    within = (frame["held"] == FREE) & (np.hypot(away[:, 0], away[:, 1]) < nozzle.diameter / 2.0)
-    within &= (away[:, 2] > FITTED[0] * nozzle.rise) & (away[:, 2] < FITTED[1] * nozzle.rise)
+    height, radius = from_exit(frame, scenario)
+    within = (frame["held"] == FREE) & (radius < nozzle.diameter / 2.0)
+    within &= (height > FITTED[0] * nozzle.rise) & (height < FITTED[1] * nozzle.rise)
     if within.sum() < 2:
         return {}
-    line = np.polyfit(away[within, 2].astype(float), frame["pressure"][within].astype(float), 1)
+    line = np.polyfit(height[within], frame["pressure"][within].astype(float), 1)
     return {"inlet_pressure_Pa": float(np.polyval(line, nozzle.rise))}
 
 

@@ -162,13 +162,24 @@ def node_of(grid: Grid, block: int, local: int):
 
 
 @wp.func
+def node_at(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int)):
+    """Where a node lies in arrays of nodes; -1 where no block is active, or beyond the grid."""
+    at = int(-1)
+    i, j, k = node[0] >> 2, node[1] >> 2, node[2] >> 2
+    if i >= 0 and j >= 0 and k >= 0 and i < grid.blocks[0] and j < grid.blocks[1] and k < grid.blocks[2]:
+        slot = table[(i * grid.blocks[1] + j) * grid.blocks[2] + k + world * grid.blocks_per_world] - 1
+        if slot >= 0:
+            at = slot * 64 + ((node[0] & 3) << 4) + ((node[1] & 3) << 2) + (node[2] & 3)
+    return at
+
+
+@wp.func
 def raw_node(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)):
     """Momentum and mass scattered to a node; zero where no block is active."""
-    b = ((node[0] >> 2) * grid.blocks[1] + (node[1] >> 2)) * grid.blocks[2] + (node[2] >> 2)
-    slot = table[b + world * grid.blocks_per_world] - 1
+    at = node_at(grid, world, node, table)
     value = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    if slot >= 0:
-        value = raw[slot * 64 + ((node[0] & 3) << 4) + ((node[1] & 3) << 2) + (node[2] & 3)]
+    if at >= 0:
+        value = raw[at]
     return value
 
 

@@ -400,4 +400,5 @@ class SolverMPM(Solver):
     def footprint(self) -> dict[str, int]:
         names = ("table", "block_of", "raw", "moving")
         more = {} if self.by_block is None else self.by_block.footprint()
+        more |= {} if self.held is None else self.held.footprint()
         return {name: getattr(self, name).capacity for name in names} | more | footprint_of(self.viscosity)

@@ -25,26 +25,14 @@ from fluidbench.native.crew import index_of
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Phase, Scene
 
-from ..tool import Tool, mirrored, outside, tool_of
-from .grid import Grid, activate_stencil, first_node
+from ..tool import Tool, mirrored, outside, table_of, tool_of
+from .grid import Grid, activate_stencil, first_node, node_at
 from .particle import PRESSED, columns_scaled, inertia, kirchhoff, resistance_of, viscous, weights
 
 wp.set_module_options({"enable_backward": False})
 
 REACH = 2.5  # of images [cells]: nodes behind the surface that particles in front of it read are then complete
 DIFFUSION = wp.constant(0.1)  # of J, over c dx; of densities: Antuono et al. 2010, Comput. Phys. Commun. 181:532
-
-
-@wp.func
-def node_at(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int)):
-    """Where a node lies in arrays of nodes; -1 where no block is active, or beyond the grid."""
-    at = int(-1)
-    i, j, k = node[0] >> 2, node[1] >> 2, node[2] >> 2
-    if i >= 0 and j >= 0 and k >= 0 and i < grid.blocks[0] and j < grid.blocks[1] and k < grid.blocks[2]:
-        slot = table[(i * grid.blocks[1] + j) * grid.blocks[2] + k + world * grid.blocks_per_world] - 1
-        if slot >= 0:
-            at = slot * 64 + ((node[0] & 3) << 4) + ((node[1] & 3) << 2) + (node[2] & 3)
-    return at
 
 
 @wp.kernel
@@ -230,4 +218,4 @@ class Held:
         scene.crew.launch(level, pool.size, inputs, [pool.volume_ratio])
 
     def footprint(self) -> dict[str, int]:
-        return {"tool.nodes": self.nodes.capacity, "tool.table": self.tool.table.capacity}
+        return {"tool.nodes": self.nodes.capacity} | table_of(self.tool)

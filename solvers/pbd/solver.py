@@ -23,10 +23,10 @@ from ..conjugate import carried_by, effort_of, footprint_of
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import cusp, drag_over, spiky, spiky_slope
-from ..tool import tool_of
+from ..smoothing import cusp, spiky, spiky_slope
+from ..tool import table_of, tool_of
 from ..tool_map import Weights
-from ..viscosity import ImplicitViscosity, Tolerance, accuracy
+from ..viscosity import ImplicitViscosity, Tolerance, accuracy, beside
 from . import kernels_warp as kernels
 from .elasticity import Elasticity
 from .numbers import MOVING, PLACE, PULLING, PUSH, Numbers, face_sums, lattice_sum, response
@@ -53,12 +53,7 @@ WAVE = 0.1  # of the time that a wave takes across the narrowest of a solid, tha
 
 def weights(support: float) -> Weights:
     """Of what the passes sum over partners: grad W, viscous drag, and the density; support [m]."""
-    return Weights(
-        slope=lambda r: spiky_slope(r, support) / r,
-        drag=lambda r: drag_over(r, support),
-        full=lambda r: drag_over(r, support) * r**4 / 3.0,
-        level=lambda r: cusp(r, support),
-    )
+    return Weights(lambda r: spiky_slope(r, support) / r, **beside(support), level=lambda r: cusp(r, support))
 
 
 class SolverPBD(Solver):
@@ -377,4 +372,4 @@ class SolverPBD(Solver):
         own = ("motion", "correction", "still", "fill", "places", "pushes")
         bytes_of = {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
         elastic = {} if self.elastic is None else self.elastic.footprint()
-        return bytes_of | elastic | footprint_of(self.viscosity)
+        return bytes_of | elastic | footprint_of(self.viscosity) | table_of(self.tool)

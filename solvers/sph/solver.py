@@ -1,6 +1,7 @@
 """Weakly compressible SPH: allocation, bounds and the order of passes."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -24,11 +25,11 @@ from ..lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import drag_over, wendland, wendland_slope
+from ..smoothing import wendland, wendland_slope
 from ..theory import sph_numbers, stable_dt
-from ..tool import tool_of
+from ..tool import table_of, tool_of
 from ..tool_map import Weights
-from ..viscosity import WORTH, ImplicitViscosity, accuracy, decided
+from ..viscosity import WORTH, ImplicitViscosity, accuracy, beside, decided
 from . import kernels_warp as kernels
 from .config import ConfigSPH
 from .particle import Smoothing
@@ -50,11 +51,8 @@ def crowding(r: float, d: float, h: float) -> float:
 
 def weights(h: float, implicit: bool) -> Weights:
     """Of what the passes sum over partners: grad W, and viscous drag by either scheme; h [m]."""
-
-    def drag(r: float) -> float:
-        return drag_over(r, 2.0 * h) if implicit else wendland_slope(r / h, h) / (r**2 + 1e-4 * h**2)
-
-    return Weights(lambda r: wendland_slope(r / h, h), drag, lambda r: drag_over(r, 2.0 * h) * r**4 / 3.0)
+    weights = Weights(lambda r: wendland_slope(r / h, h), **beside(2.0 * h))
+    return weights if implicit else replace(weights, drag=lambda r: wendland_slope(r / h, h) / (r * r))
 
 
 class SolverSPH(Solver):
@@ -365,4 +363,4 @@ class SolverSPH(Solver):
 
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}
-        return own | self.neighbours.footprint() | footprint_of(self.viscosity)
+        return own | self.neighbours.footprint() | footprint_of(self.viscosity) | table_of(self.tool)

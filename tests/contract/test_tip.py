@@ -153,4 +153,6 @@ def test_a_body_may_stick_out_of_the_domain(method):
 def test_without_a_body_nothing_of_it_is_there(method):
     sim = Simulation(bead(), method)
     assert sim.scene.carriage is None and sim.scene.outline is None
-    assert not [name for name in sim.footprint() if "tool" in name or "surface" in name]
+    assert not [name for name in sim.footprint() if "tool" in name]
+    assert sim.footprint().get("solver.viscous_driven", 0) == 0
+    assert Simulation(strand(), method).footprint()["solver.tool.table"] > 0

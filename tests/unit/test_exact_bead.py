@@ -94,7 +94,7 @@ def test_no_bead_without_a_moving_nozzle():
 
 def by_hand(width, area, laid=1.0):
     station, width = np.linspace(0.0, 2.0, len(width)), np.array(width, float)
-    return Bead(station, width, 10.0 * width, np.array(area, float), width, middle=None, laid=laid)
+    return Bead(station, width, 10.0 * width, np.array(area, float), middle=None, laid=laid)
 
 
 @pytest.mark.parametrize("count", [11, 201])
@@ -115,7 +115,7 @@ def test_averages_run_over_the_middle_of_what_was_laid():
     summary = by_hand(values, values, laid=0.5).summary(1)
     assert summary["bead_width_m"] == pytest.approx(2.0) and summary["bead_area_m2"] == pytest.approx(2.0)
     assert by_hand(values, values, laid=0.004).summary(1) == {}
-    assert Bead(*[np.ones(3)] * 5, middle=None).laid == 1.0
+    assert Bead(*[np.ones(3)] * 4, middle=None).laid == 1.0
 
 
 def test_the_share_that_was_laid_follows_from_the_last_release():

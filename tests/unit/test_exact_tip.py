@@ -127,6 +127,8 @@ def test_the_inlet_pressure_is_that_of_a_line_through_the_bores():
 def test_there_is_no_inlet_pressure_without_a_bore_a_pressure_or_a_flow():
     frame = column(5e5)
     assert feeding(frame, bead()) == {} and feeding(column(5e5, time=np.array(0.31)), pressed()) == {}
+    travels = {"kind": "polyline", "points": [[0.0, 0.0], [0.03, 0.0], [0.03, 0.01]], "speed": 0.1, "flows": [0.0, 1.0]}
+    assert feeding(frame, pressed(toolpath=travels)) == {}
     frame.pop("pressure")
     assert feeding(frame, pressed()) == {}
 
