@@ -103,9 +103,20 @@ def image_traction(box: Box, g: wp.vec3, code: int):
 
 
 @wp.func
-def contained(box: Box, x: wp.vec3, inset: float):
-    """A position wrapped along periodic axes and kept `inset` in front of walls, so it never meets its own image."""
+def walled(box: Box, x: wp.vec3, inset: float):
+    """A position kept `inset` in front of walls, so it never meets its own image."""
     out = x
+    for axis in range(3):
+        if box.lower_kind[axis] != PERIODIC:
+            out[axis] = wp.clamp(x[axis], box.lower[axis] + inset, box.upper[axis] - inset)
+    return out
+
+
+@wp.func
+def contained(box: Box, x: wp.vec3, inset: float):
+    """The same, wrapped along periodic axes, too. Lists name images by the side on which they were: they must be made
+    anew before the next sum over them."""
+    out = walled(box, x, inset)
     for axis in range(3):
         low, high = box.lower[axis], box.upper[axis]
         if box.lower_kind[axis] == PERIODIC:
@@ -113,8 +124,6 @@ def contained(box: Box, x: wp.vec3, inset: float):
                 out[axis] = x[axis] + (high - low)
             elif x[axis] >= high:
                 out[axis] = x[axis] - (high - low)
-        else:
-            out[axis] = wp.clamp(x[axis], low + inset, high - inset)
     return out
 
 

@@ -85,17 +85,26 @@ def image_traction(box, g, code):
 
 
 @ti.func
-def contained(box, x, inset):
-    """A position wrapped along periodic axes and kept `inset` in front of walls."""
+def walled(box, x, inset):
+    """A position kept `inset` in front of walls."""
     out = x
     for axis in ti.static(range(3)):
-        low, high = box.lower[axis], box.upper[axis]
         if box.lower_kind[axis] != PERIODIC:
-            out[axis] = ti.math.clamp(x[axis], low + inset, high - inset)
-        elif x[axis] < low:
-            out[axis] += high - low
-        elif x[axis] >= high:
-            out[axis] -= high - low
+            out[axis] = ti.math.clamp(x[axis], box.lower[axis] + inset, box.upper[axis] - inset)
+    return out
+
+
+@ti.func
+def contained(box, x, inset):
+    """The same, wrapped along periodic axes, too; lists are outdated then."""
+    out = walled(box, x, inset)
+    for axis in ti.static(range(3)):
+        low, high = box.lower[axis], box.upper[axis]
+        if box.lower_kind[axis] == PERIODIC:
+            if x[axis] < low:
+                out[axis] += high - low
+            elif x[axis] >= high:
+                out[axis] -= high - low
     return out
 
 

@@ -22,7 +22,7 @@ from . import carriage, clock, crew, health, pool, sorting
 from .device import CountedLaunches
 from .health import Health, Letter, Vital
 from .pool import Pool
-from .process import births, contact, curing, emission, expansion
+from .process import births, contact, curing, emission, expansion, room
 from .process.contact import Contact
 from .process.curing import Curing
 from .process.emission import Emission
@@ -106,7 +106,7 @@ class Simulation(Session):
             self.scene.crew.load(module)
         parts = [(emission, self.emission), (curing, self.curing), (contact, self.contact)]
         parts += [(carriage, self.scene.carriage)]
-        parts += [(module, self.growing) for module in (expansion, births)]
+        parts += [(module, self.growing) for module in (expansion, births, room)]
         for module in (module for module, part in parts if part is not None):
             self.scene.crew.load(module)
 

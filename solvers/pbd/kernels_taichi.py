@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 from fluidbench.method.frame import FREE
 from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import FRICTION, PERIODIC
+from fluidbench.native.scene import FRICTION
 
 from ..images import WALL_INSET
-from ..neighbours_taichi import BoxT, ListsT, contained
+from ..neighbours_taichi import BoxT, ListsT, contained, walled
 from ..pairs_taichi import over_pairs, reader, vector_at, vector_into
 from ..smoothing import cusp
 from ..taichi_bridge import (
@@ -33,17 +33,6 @@ from .numbers import PLACE, PUSH
 
 summed = taichi_func(cusp)
 place_of, push_of = reader(PLACE), reader(PUSH)
-
-
-@ti.func
-def kept_inside(box, free, inset):
-    """A position in front of the walls, and how far they have moved it; a periodic wrap is no motion."""
-    inside = contained(box, free, inset)
-    back = inside - free
-    for axis in ti.static(range(3)):
-        if box.lower_kind[axis] == PERIODIC:
-            back[axis] = 0.0
-    return inside, back
 
 
 @ti.kernel
@@ -72,8 +61,8 @@ def predict(
             free = position[i] + dt[world] * v
             if too_fast(v, HURRIED * box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
-            x, back = kept_inside(box, free, WALL_INSET * num.spacing)
-            position[i], motion[i] = x, dt[world] * v + back
+            x = contained(box, free, WALL_INSET * num.spacing)
+            position[i], motion[i] = x, dt[world] * v + (walled(box, free, WALL_INSET * num.spacing) - free)
             places[i] = vec4(x[0], x[1], x[2], volume[i])
 
 
@@ -192,9 +181,9 @@ def apply(
             free = position[i] + shift
             if beyond(wanted, FARTHEST * num.spacing):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
-            x, back = kept_inside(box, free, WALL_INSET * num.spacing)
+            x = walled(box, free, WALL_INSET * num.spacing)
             position[i] = x
-            motion[i] += shift + back
+            motion[i] += shift + (x - free)
             places[i] = vec4(x[0], x[1], x[2], volume[i])
 
 
@@ -221,7 +210,7 @@ def follow(
         world = i // capacity
         if i - world * capacity < count[world] and held[i] == FREE:
             free = position[i] + dt[world] * dt[world] * drag[i]
-            position[i] = contained(box, free, WALL_INSET * num.spacing)
+            position[i] = walled(box, free, WALL_INSET * num.spacing)
 
 
 @ti.func

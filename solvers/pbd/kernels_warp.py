@@ -18,13 +18,13 @@ from fluidbench.native.scene import Box, Force, Phase, force_at, is_solid, too_f
 from fluidbench.native.vector_access import store_vec4
 
 from ..bind import warp_func
-from ..images import WALL_INSET, contained
+from ..images import WALL_INSET, contained, walled
 from ..pairs import Pass, floats
 from ..smoothing import cusp
 from ..tool import Tool, felt, outside
 from .elastic_warp import KERNELS, elastic, sloping
 from .numbers import PLACE, PUSH, Numbers
-from .walls import pushed, wall_friction
+from .walls import wall_friction
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -75,7 +75,7 @@ def predict(
         if too_fast(v, HURRIED * box.top_speed):
             raise_fault(fault, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
-        motion[i] = h * v + pushed(box, free, x)
+        motion[i] = h * v + (walled(box, free, WALL_INSET * num.spacing) - free)  # a periodic wrap is none
         position[i] = x
         store_vec4(places, i, wp.vec4(x[0], x[1], x[2], volume[i]))
 
@@ -210,8 +210,8 @@ def apply(
         free = position[i] + shift
         if not (length <= FARTHEST * num.spacing):
             raise_fault(fault, FAULT_ASTRAY)
-        x = contained(box, free, WALL_INSET * num.spacing)
-        motion[i] = motion[i] + shift + pushed(box, free, x)
+        x = walled(box, free, WALL_INSET * num.spacing)
+        motion[i] = motion[i] + shift + (x - free)
         position[i] = x
         store_vec4(places, i, wp.vec4(x[0], x[1], x[2], volume[i]))
 
@@ -253,7 +253,7 @@ def follow(
     world = i / capacity
     if i - world * capacity < count[world] and held[i] == FREE:
         free = position[i] + (dt[world] * dt[world]) * drag[i]
-        position[i] = contained(box, free, WALL_INSET * num.spacing)
+        position[i] = walled(box, free, WALL_INSET * num.spacing)
 
 
 @wp.kernel

@@ -1,7 +1,8 @@
 """Births on the device: how many children a particle has, where they lie, how fast they are, whose they are.
 
 A parent becomes the first of its children, the others take free slots and inherit every field of the pool; mass is
-split evenly and momentum stays. What a child is depends on its parent's identity and on the scenario's seed alone.
+split evenly and momentum stays. What a child is depends on its parent's identity and on the scenario's seed alone, but
+where halves lie on the room that there is, too (room.py).
 """
 
 import warp as wp
@@ -16,7 +17,6 @@ wp.set_module_options({"enable_backward": False})
 FIRST_DRAW = wp.constant(8)  # draws of a child: direction (2), distance, noise (3)
 PER_CHILD = wp.constant(8)
 INSIDE = wp.constant(0.25)  # least distance of a child from a wall, over the spacing
-APART = wp.constant(0.25)  # where the halves of a split lie from its centre, over the edge of its volume
 
 
 @wp.struct
@@ -107,11 +107,10 @@ def inherit(
 
 
 @wp.func
-def offset_of(law: BirthLaw, chance: Chance, parent: int, generation: int, children: int, c: int, edge: float):
+def offset_of(law: BirthLaw, chance: Chance, parent: int, generation: int, c: int, edge: float, way: wp.vec3):
     """Where child c would like to be from the centre of its parent [m], and its noise [m/s]; before means are taken."""
     if law.splits == 1:
-        side = 1.0 - 2.0 * float(c)
-        return (side * APART * edge) * direction(chance, parent, generation, FIRST_DRAW), wp.vec3(0.0, 0.0, 0.0)
+        return (1.0 - 2.0 * float(c)) * way, wp.vec3(0.0, 0.0, 0.0)
     draw = FIRST_DRAW + PER_CHILD * c
     reach = wp.pow(uniform(chance, parent, generation, draw + 2), 1.0 / 3.0)
     out = (law.radius * edge * reach) * direction(chance, parent, generation, draw)
@@ -129,6 +128,7 @@ def deliver(
     parent: wp.array(dtype=int),
     number: wp.array(dtype=int),
     offspring_count: wp.array(dtype=int),
+    halfway: wp.array(dtype=wp.vec3),
     # outputs
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -152,12 +152,15 @@ def deliver(
         if children > 0:
             who, age = origin[i], generation[i]
             edge = wp.pow(volume[i] * law.ratio, 1.0 / 3.0)
+            way = wp.vec3(0.0, 0.0, 0.0)
+            if law.splits == 1:
+                way = halfway[ancestor]
             mean_place, mean_noise = wp.vec3(0.0, 0.0, 0.0), wp.vec3(0.0, 0.0, 0.0)
             for other in range(children):
-                place, noise = offset_of(law, chance, who, age, children, other, edge)
+                place, noise = offset_of(law, chance, who, age, other, edge, way)
                 mean_place += place / float(children)
                 mean_noise += noise / float(children)
-            place, noise = offset_of(law, chance, who, age, children, c, edge)
+            place, noise = offset_of(law, chance, who, age, c, edge, way)
             out = place - mean_place
             x = position[i] + out
             velocity[i] = velocity[i] + (noise - mean_noise) + (law.impulse / (law.radius * edge)) * out

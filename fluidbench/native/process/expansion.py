@@ -13,8 +13,9 @@ from ..clock import Hours
 from ..crew import index_of
 from ..pool import Pool
 from ..scene import Scene
-from .births import BirthLaw, conceive, deliver, inherit
+from .births import FIRST_DRAW, BirthLaw, conceive, deliver, inherit
 from .chance import Chance, chance_of, uniform
+from .room import VIEW, find_room
 
 wp.set_module_options({"enable_backward": False})
 
@@ -83,6 +84,8 @@ class Growing:
                 self.number = wp.zeros(pool.size, dtype=int)
                 self.born = wp.zeros(pool.worlds + 1, dtype=int)
                 self.old = wp.zeros(pool.worlds, dtype=int)
+                self.halfway = wp.zeros(pool.size * self.law.splits, dtype=wp.vec3)
+                self.room = wp.HashGrid(64, 64, 64) if self.law.splits else None
 
     def _birth_law(self, model: Expansion, generations: int) -> BirthLaw:
         d = self.scene.spacing
@@ -157,6 +160,7 @@ class Growing:
         born = np.array(each)
         for world in range(pool.worlds):
             pool.need(world, int(born[world]))
+        self.find_room()
         self.old.assign(np.array(pool.counts, np.int32))
         if born.any():
             wp.launch(
@@ -180,12 +184,33 @@ class Growing:
                 self.parent,
                 self.number,
                 self.offspring_count,
+                self.halfway,
             ],
             [pool.position, pool.velocity, pool.mass, pool.volume, pool.origin, pool.generation],
             device=device,
         )
         return True
 
+    def find_room(self) -> None:
+        """Where the halves of what splits now will lie."""
+        if self.room is None:
+            return
+        pool, view = self.pool, VIEW * self.scene.spacing
+        for world, count in enumerate(pool.counts):
+            own = slice(world * pool.capacity, world * pool.capacity + count)
+            position = pool.position[own]
+            self.room.build(position, view)
+            fields = (self.offspring_count, pool.origin, pool.generation, pool.volume)
+            wp.launch(
+                find_room,
+                count,
+                [self.room.id, self.chance, int(FIRST_DRAW), self.scene.box, view]
+                + [field[own] for field in fields]
+                + [position],
+                [self.halfway[own]],
+                device=self.scene.device,
+            )
+
     def footprint(self) -> dict[str, int]:
-        names = ("offspring_count", "parent", "number", "born", "old") if self.births else ()
+        names = ("offspring_count", "parent", "number", "born", "old", "halfway") if self.births else ()
         return {name: getattr(self, name).capacity for name in names}
