@@ -76,5 +76,4 @@ CASE = Case(
     tolerance=0.02,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "the foam outruns its growth, for no tension holds its surface: 0.59 at R / 4"},
 )
