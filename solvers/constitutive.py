@@ -7,8 +7,9 @@ State of a material point: the volume ratio J = rho0 / rho and the isochoric ela
 
 with the pressure from an equation of state, the elastic deviator limited by Herschel-Bulkley flow and an explicit
 Newtonian viscosity eta. Flow follows Simo (1988) and Yue et al. (2015, ACM TOG 34:160): the yield criterion is von
-Mises, sqrt(J2) = yield stress in pure shear, so a bar in uniaxial compression yields at sqrt(3) times that. With a
-relaxation time instead of a yield stress b is the conformation tensor of an Oldroyd-B liquid (det b is then free).
+Mises, sqrt(J2) = yield stress in pure shear, so a bar in uniaxial compression yields at sqrt(3) times that. It may
+harden with plastic strain (Voce): a step flows at the yield stress with which it begins. With a relaxation time instead
+of a yield stress b is the conformation tensor of an Oldroyd-B liquid (det b is then free).
 
 Every function is a plain law of floats (see bind.py): no solver, no array.
 """
@@ -52,6 +53,26 @@ def flow_stress(trial: float, threshold: float, consistency: float, index: float
                 rate = rate - (power + stiffness * rate - over) / slope
             tau = trial - stiffness * rate
     return tau
+
+
+def hardened(initial: float, saturated: float, rate: float, strain: float):
+    """Yield stress in pure shear [Pa] after an equivalent plastic strain `strain` [-] (that of uniaxial stress):
+    saturated + (initial - saturated) exp(-rate strain). Voce 1948, J. Inst. Metals 74:537.
+    """
+    return saturated + (initial - saturated) * exp(-rate * strain)
+
+
+def plastic_strain(b_xx: float, b_yy: float, b_zz: float, b_xy: float, b_xz: float, b_yz: float, keep: float):
+    """Equivalent plastic strain of a step [-]: (trial - tau) / (sqrt(3) G tr(b) / 3), tau = sqrt(J2).
+
+    `keep` = tau / trial is the share of the deviator that `strain_and_flow` kept of its trial, b what it returned.
+    """
+    m = (b_xx + b_yy + b_zz) / 3.0
+    s_xx = b_xx - m
+    s_yy = b_yy - m
+    s_zz = b_zz - m
+    j2 = 0.5 * (s_xx * s_xx + s_yy * s_yy + s_zz * s_zz) + b_xy * b_xy + b_xz * b_xz + b_yz * b_yz
+    return (1.0 - keep) * sqrt(j2) / (sqrt(3.0) * keep * m)
 
 
 def strain_and_flow(

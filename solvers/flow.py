@@ -2,7 +2,8 @@
 
 import warp as wp
 
-from fluidbench.native.scene import Phase
+from fluidbench.native.pool import MOST, Pool
+from fluidbench.native.scene import Phase, Scene
 
 from . import constitutive
 from .bind import warp_func
@@ -11,24 +12,47 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 pressure = warp_func(constitutive.pressure)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
+hardened = warp_func(constitutive.hardened)
+plastic_strain = warp_func(constitutive.plastic_strain)
+
+
+def plastic_strains(scene: Scene, pool: Pool) -> wp.array:
+    """Equivalent plastic strain of every slot, a field of the pool; where nothing hardens one zero, never read."""
+    if scene.hardens:
+        return pool.add_field("plastic_strain", float, within=(0.0, MOST))
+    return wp.zeros(1, dtype=float, device=scene.device)
 
 
 @wp.func
-def strained(phase: Phase, modulus: float, l: wp.mat33, b: wp.vec3, s: wp.vec3, h: float):
-    """The elastic tensor after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz, yz; the share
-    of its deviator that was kept."""
+def strained(
+    phase: Phase,
+    modulus: float,
+    l: wp.mat33,
+    b: wp.vec3,
+    s: wp.vec3,
+    h: float,
+    i: int,
+    plastic: wp.array(dtype=float),
+):
+    """The elastic tensor of particle i after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz,
+    yz; the share of its deviator that was kept. Its plastic strain grows where it hardens."""
+    threshold = phase.yield_stress
+    if phase.hardening > 0.0:
+        threshold = hardened(threshold, phase.saturated_yield_stress, phase.hardening, plastic[i])
     xx, yy, zz, xy, xz, yz, kept = strain_and_flow(
         l[0, 0], l[0, 1], l[0, 2],
         l[1, 0], l[1, 1], l[1, 2],
         l[2, 0], l[2, 1], l[2, 2],
         b[0], b[1], b[2], s[0], s[1], s[2],
         modulus,
-        phase.yield_stress,
+        threshold,
         phase.plastic_viscosity,
         phase.flow_index,
         phase.relaxation_rate,
         h,
     )  # fmt: skip
+    if phase.hardening > 0.0:
+        plastic[i] = plastic[i] + plastic_strain(xx, yy, zz, xy, xz, yz, kept)
     return wp.vec3(xx, yy, zz), wp.vec3(xy, xz, yz), kept
 
 

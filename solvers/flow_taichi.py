@@ -5,12 +5,17 @@ from .taichi_bridge import taichi_func, ti, vec3
 
 pressure = taichi_func(constitutive.pressure)
 strain_and_flow = taichi_func(constitutive.strain_and_flow, constitutive.flow_stress)
+hardened = taichi_func(constitutive.hardened)
+plastic_strain = taichi_func(constitutive.plastic_strain)
 
 
 @ti.func
-def strained(phase, modulus, l, b, s, h):
-    """The elastic tensor after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz, yz; the share
-    of its deviator that was kept."""
+def strained(phase, modulus, l, b, s, h, i, plastic: ti.template()):
+    """The elastic tensor of particle i after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz,
+    yz; the share of its deviator that was kept. Its plastic strain grows where it hardens."""
+    threshold = phase.yield_stress
+    if phase.hardening > 0.0:
+        threshold = hardened(threshold, phase.saturated_yield_stress, phase.hardening, plastic[i])
     xx, yy, zz, xy, xz, yz, kept = strain_and_flow(
         l[0, 0],
         l[0, 1],
@@ -28,12 +33,14 @@ def strained(phase, modulus, l, b, s, h):
         s[1],
         s[2],
         modulus,
-        phase.yield_stress,
+        threshold,
         phase.plastic_viscosity,
         phase.flow_index,
         phase.relaxation_rate,
         h,
     )
+    if phase.hardening > 0.0:
+        plastic[i] += plastic_strain(xx, yy, zz, xy, xz, yz, kept)
     return vec3(xx, yy, zz), vec3(xy, xz, yz), kept
 
 

@@ -95,20 +95,7 @@ PhaseT = struct_of(Phase)
 @ti.func
 def phase_at(phases: ti.template(), world, level):
     """A row of the phase table."""
-    return PhaseT(
-        phases[world, level, 0],
-        phases[world, level, 1],
-        phases[world, level, 2],
-        phases[world, level, 3],
-        phases[world, level, 4],
-        phases[world, level, 5],
-        phases[world, level, 6],
-        phases[world, level, 7],
-        phases[world, level, 8],
-        phases[world, level, 9],
-        phases[world, level, 10],
-        phases[world, level, 11],
-    )
+    return PhaseT(*[phases[world, level, k] for k in ti.static(range(len(Phase.vars)))])
 
 
 @ti.func

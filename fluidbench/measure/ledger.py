@@ -9,7 +9,7 @@ from .bead import Bead, laid_share, layer_heights, measure_bead
 from .deposit import Deposit
 from .feed import feeding, is_out
 from .slump import measure_slump
-from .tower import family_spread, is_tower, measure_tower, progress, standing
+from .tower import family_spread, is_tower, is_wall, measure_tower, progress, standing, wall_posture
 
 
 def deposit_of(frame: Frame, scenario: Scenario) -> Deposit:
@@ -42,7 +42,7 @@ def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     row = {"resolution_m": deposit.spacing, "top_m": deposit.top() - scenario.domain.lower[2]}
     row |= measure_slump(deposit, scenario)
     if is_tower(scenario):
-        row |= standing(deposit, scenario)
+        row |= standing(deposit, scenario) | (wall_posture(frame, scenario) if is_wall(scenario) else {})
     elif scenario.track is not None and float(frame["time"]) >= scenario.track.end * (1.0 - 1e-6):
         row |= beads(frame, deposit, scenario)
     return row | progress(frame, scenario) | feeding(frame, scenario)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..method.frame import CARRIED, Frame
 from ..scenario import Scenario
+from .collapse import LEANT, Collapse, collapse_of, posture
 from .deposit import Deposit
 from .feed import is_out
 
@@ -48,6 +49,11 @@ class Criterion:
 def is_tower(scenario: Scenario) -> bool:
     path, track = scenario.toolpath, scenario.track
     return path is not None and track is not None and path.layers > 1 and path.speed > 0 and track.repeats
+
+
+def is_wall(scenario: Scenario) -> bool:
+    """Whether a tower's layers have a side to lean to: those of a ring hold each other."""
+    return is_tower(scenario) and scenario.toolpath is not None and scenario.toolpath.kind != "ring"
 
 
 def layer_of(frame: Frame, scenario: Scenario) -> np.ndarray:
@@ -89,6 +95,25 @@ def standing(deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     heights = path_heights(deposit, scenario)
     low = (1.0 - HEIGHT_TOLERANCE) * plan_height(scenario)
     return {"print_height_m": float(np.median(heights)), "print_standing": float((heights >= low).mean())}
+
+
+def wall_posture(frame: Frame, scenario: Scenario) -> dict[str, float]:
+    """How far the centre of any layer lies off the path of a wall, and how wide the lowest layer is, within the middle
+    of the path [m]."""
+    along, across, up = _path_coordinates(frame["position"].astype(float), scenario)
+    layer = np.where(_in_middle(along, scenario), layer_of(frame, scenario), -1)
+    found = posture(across, up, frame["mass"].astype(float), layer)
+    return {name: found[name] for name in ("wall_lean_m", "foot_width_m")}
+
+
+def wall_collapse(scenario: Scenario, series: Any) -> Collapse | None:
+    """When and how a wall came down, from the table of measures over time; None if it stands."""
+    path, track = scenario.toolpath, scenario.track
+    assert path is not None and track is not None
+    times = series["time_s"].to_numpy()
+    whole = np.where(times < track.end * (1.0 - 1e-6), track.layer_at(times), path.layers)
+    rows = [series[name].tolist() for name in ("wall_lean_m", "foot_width_m", "print_height_m")]
+    return collapse_of(times.tolist(), whole.tolist(), plan_height(scenario) / path.layers, *rows)
 
 
 def path_heights(deposit: Deposit, scenario: Scenario) -> np.ndarray:
@@ -258,6 +283,9 @@ def success(scenario: Scenario, measures: Mapping[str, float], series: Any) -> l
         off = max((abs(measures[f"{n}_radius_m"] / path.radius - 1) for n in laid), default=1.0)
         met = off <= RADIUS_TOLERANCE
         found.append(Criterion("worst radius error", off, f"<= {RADIUS_TOLERANCE:g}", met, Print.DEFORMED))
+    if is_wall(scenario):
+        lean = measures["wall_lean_m"] / measures["foot_width_m"] if measures["foot_width_m"] > 0 else 0.0
+        found.append(Criterion("lean over the foot's width", lean, f"< {LEANT:g}", lean < LEANT, Print.COLLAPSED))
     after = series.loc[series["time_s"] >= track.end, "print_height_m"].tolist()
     sunk = 1.0 - after[-1] / after[0] if len(after) > 1 and after[0] > 0 else float("nan")
     found.append(Criterion("sunk after the last layer", sunk, f"<= {CREEP:g}", bool(sunk <= CREEP), Print.DEFORMED))

@@ -15,6 +15,7 @@ class Feature(Enum):
     VISCOSITY = "Newtonian viscosity"
     ELASTICITY = "elastic shear stress"
     YIELD = "yield stress"
+    HARDENING = "yield stress that hardens"
     RELAXATION = "stress that relaxes"
     FRICTION = "Coulomb friction at walls"
     PERIODIC = "periodic axes"
@@ -35,6 +36,7 @@ def needed(scenario: Scenario) -> frozenset[Feature]:
         Feature.VISCOSITY: any(level.viscosity > 0 for level in levels),
         Feature.ELASTICITY: any(level.youngs_modulus is not None for level in levels),
         Feature.YIELD: any(bool(level.yield_stress) for level in levels),
+        Feature.HARDENING: m.hardening is not None,
         Feature.RELAXATION: m.relaxation_time is not None,
         Feature.FRICTION: scenario.domain.rubs,
         Feature.PERIODIC: any(walls.periodic()),

@@ -33,6 +33,8 @@ class Phase:
     shear_modulus: float
     viscosity: float
     yield_stress: float
+    saturated_yield_stress: float
+    hardening: float
     plastic_viscosity: float
     flow_index: float
     relaxation_rate: float
@@ -143,6 +145,8 @@ class Scene:
         phase.shear_modulus = material.shear_modulus
         phase.viscosity = material.viscosity
         phase.yield_stress = min(material.flow_threshold, NEVER_YIELDS)
+        phase.saturated_yield_stress = material.saturated_yield_stress or 0.0
+        phase.hardening = material.hardening or 0.0
         phase.plastic_viscosity = material.plastic_viscosity
         phase.relaxation_rate = 0.0 if material.relaxation_time is None else 1.0 / material.relaxation_time
         phase.flow_index = material.flow_index
@@ -166,6 +170,11 @@ class Scene:
     def viscous(self) -> bool:
         """Whether anything has Newtonian viscosity, now or later."""
         return self._any(lambda m: m.viscosity > 0)
+
+    @property
+    def hardens(self) -> bool:
+        """Whether anything hardens with plastic strain."""
+        return any(s.material.hardening for s in self.scenarios)
 
     @property
     def cures(self) -> bool:

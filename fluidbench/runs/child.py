@@ -100,7 +100,7 @@ def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str,
     from ..measure.order import departures, order
     from ..measure.reference import answers
     from ..measure.rest import at_rest, creep, moving
-    from ..measure.tower import is_tower, success, verdict_of
+    from ..measure.tower import is_tower, is_wall, success, verdict_of, wall_collapse
 
     final = ledger(frame, scenario) | final_lengths(frame, scenario) | fed(series)
     final |= order(frame, scenario) | creep(series, scenario)
@@ -115,6 +115,7 @@ def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str,
         "not_compared": tuple(not_compared),
         "success": tuple(criteria),
         "print": verdict_of(criteria) if criteria else None,
+        "collapse": wall_collapse(scenario, series) if is_wall(scenario) else None,
         "warnings": _numberless(final) + departures(final) + unrest,
     }
 

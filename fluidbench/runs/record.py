@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from ..measure.collapse import Collapse
 from ..measure.reference import Answer
 from ..measure.tower import Criterion, Print
 from ..method.frame import Frame
@@ -80,6 +81,7 @@ class Record(BaseModel):
     not_compared: tuple[str, ...] = ()  # why references do not apply
     success: tuple[Criterion, ...] = ()  # of a print
     print: Print | None = None  # what became of it
+    collapse: Collapse | None = None  # of a wall
     cost: Cost | None = None
     launches: dict[str, float] = {}
     solves: dict[str, float] = {}  # what iterative solves took, see native/solver.py

@@ -17,6 +17,8 @@ USERS = {
     "exponent": ("avrami",),
 }
 """Keys that only some laws use."""
+TARGETS = ("youngs_modulus", "viscosity", "yield_stress", "saturated_yield_stress", "plastic_viscosity")
+"""Parameters of the material that may change."""
 
 
 class Cure(Model):
@@ -41,6 +43,9 @@ class Cure(Model):
     youngs_modulus: Positive | None = Field(default=None, description="Young's modulus when cured [Pa]")
     viscosity: NonNegative | None = Field(default=None, description="Newtonian viscosity when cured [Pa s]")
     yield_stress: NonNegative | None = Field(default=None, description="yield stress when cured [Pa]")
+    saturated_yield_stress: Positive | None = Field(
+        default=None, description="yield stress after much plastic strain when cured [Pa]"
+    )
     plastic_viscosity: NonNegative | None = Field(
         default=None, description="Herschel-Bulkley consistency when cured [Pa s^n]"
     )
@@ -55,14 +60,13 @@ class Cure(Model):
         if self.jitter > self.delay:
             raise ValueError(f"jitter = {self.jitter} exceeds delay = {self.delay}: some would cure before they exist")
         if not self.targets:
-            raise ValueError("nothing to cure: give youngs_modulus, viscosity, yield_stress or plastic_viscosity")
+            raise ValueError(f"nothing to cure: give one of {', '.join(TARGETS)}")
         return self
 
     @property
     def targets(self) -> dict[str, float]:
         """Parameters of the fully cured material that differ from the fresh one's."""
-        names = ("youngs_modulus", "viscosity", "yield_stress", "plastic_viscosity")
-        return {name: value for name in names if (value := getattr(self, name)) is not None}
+        return {name: value for name in TARGETS if (value := getattr(self, name)) is not None}
 
     @property
     def levels(self) -> int:

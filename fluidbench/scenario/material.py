@@ -23,6 +23,12 @@ class Material(Model):
     poisson_ratio: Annotated[float, Field(gt=-1.0, lt=0.5)] = Field(0.3, description="Poisson ratio [-]")
     viscosity: NonNegative = Field(0.0, description="Newtonian dynamic viscosity [Pa s]")
     yield_stress: NonNegative | None = Field(None, description="von Mises yield stress in pure shear [Pa]")
+    saturated_yield_stress: Positive | None = Field(
+        None, description="yield stress after much plastic strain, where it hardens [Pa]"
+    )
+    hardening: Positive | None = Field(
+        None, description="rate at which it does: (saturated - present) falls as exp(-rate x plastic strain) [-]"
+    )
     flow_index: Positive = Field(1.0, description="Herschel-Bulkley exponent n [-]")
     plastic_viscosity: NonNegative = Field(0.0, description="Herschel-Bulkley consistency [Pa s^n]")
     relaxation_time: Positive | None = Field(None, description="of an Oldroyd-B liquid, instead of a yield stress [s]")
@@ -47,9 +53,28 @@ class Material(Model):
             raise ValueError("relaxation_time makes an Oldroyd-B liquid: leave out yield_stress and plastic_viscosity")
         if self.plastic_viscosity > 0 and self.yield_stress is None:
             raise ValueError("plastic_viscosity needs yield_stress (0 for a Maxwell liquid, or use viscosity)")
+        self._check_hardening()
         if self.cure is not None:
             self._check_cure(self.cure)
         return self
+
+    def _check_hardening(self) -> None:
+        if (self.hardening is None) != (self.saturated_yield_stress is None):
+            raise ValueError("hardening and saturated_yield_stress belong together: give both or neither")
+        if self.cure is not None and self.cure.saturated_yield_stress is not None and self.hardening is None:
+            raise ValueError("cure.saturated_yield_stress needs hardening and saturated_yield_stress")
+        if self.hardening is None:
+            return
+        if not self.yield_stress:
+            raise ValueError("hardening needs a yield_stress above 0 to begin from")
+        for degree, when in ((0.0, "fresh"), (1.0, "cured")):
+            aged = self.at(degree)
+            first, last = aged.yield_stress or 0.0, aged.saturated_yield_stress or 0.0
+            if last < first:
+                raise ValueError(
+                    f"{when}, saturated_yield_stress = {last:g} lies below yield_stress = {first:g}: what "
+                    "softens breaks along a plane as thin as a spacing, whatever that is"
+                )
 
     def _check_cure(self, cure: Cure) -> None:
         if self.relaxation_time is not None:
@@ -125,6 +150,11 @@ class Material(Model):
         """Whether it never flows: elastic, without relaxation, yielding not before a shear of 100 % if at all."""
         elastic = self.youngs_modulus is not None and self.relaxation_time is None
         return elastic and self.flow_threshold >= self.shear_modulus
+
+    @property
+    def strength(self) -> float:
+        """Largest shear stress that it withstands without flow, however often it has yielded [Pa]."""
+        return max(self.flow_threshold, self.saturated_yield_stress or 0.0)
 
     @property
     def flow_threshold(self) -> float:

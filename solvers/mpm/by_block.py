@@ -14,8 +14,9 @@ from .patches import add_up, gather, resist, scatter
 class ByBlock:
     """What the block-wise transfers allocate, and their launches; for one thread of the CPU or several."""
 
-    def __init__(self, scene: Scene, pool: Pool, slots: int, resists: bool) -> None:
-        """`resists` is whether viscosity is implicit."""
+    def __init__(self, scene: Scene, pool: Pool, strains: list[wp.array], slots: int, resists: bool) -> None:
+        """`strains` are the fields of the pool that a step strains; `resists` is whether viscosity is implicit."""
+        self.strains = strains
         self.scene, self.pool, self.launch, self.lanes = scene, pool, scene.crew.launch, scene.crew.threads
         homes = self.homes = Homes()
         with wp.ScopedDevice(scene.device):
@@ -67,7 +68,7 @@ class ByBlock:
                 hours.row,
                 hours.exit,
             ],
-            [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear],
+            self.strains,
         )
         self.launch(add_up, self.lanes, [self.lanes, grid, active, block_of, table, self.homes], [raw])
 

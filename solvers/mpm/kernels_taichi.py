@@ -215,6 +215,7 @@ def passes(alone: bool) -> SimpleNamespace:
         volume_ratio: Floats,
         elastic_normal: Vectors,
         elastic_shear: Vectors,
+        plastic: Floats,
         raw: Quads,
         fault: Ints,
     ):
@@ -237,7 +238,7 @@ def passes(alone: bool) -> SimpleNamespace:
                 if held[p] != CARRIED and h > 0.0:
                     j *= ti.max(1.0 + h * c.trace(), 0.1)
                     if phase.shear_modulus > 0.0:
-                        b, s, _ = strained(phase, phase.shear_modulus, c, b, s, h)
+                        b, s, _ = strained(phase, phase.shear_modulus, c, b, s, h, p, plastic)
                         elastic_normal[p], elastic_shear[p] = b, s
                     volume_ratio[p] = j
                 if h > 0.0 and (held[p] != CARRIED or drags == 0):

@@ -68,6 +68,7 @@ def p2g(
     volume_ratio: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
     elastic_shear: wp.array(dtype=wp.vec3),
+    plastic: wp.array(dtype=float),
     raw: wp.array(dtype=wp.vec4),
     fault: wp.array(dtype=int),
 ):
@@ -96,6 +97,7 @@ def p2g(
         volume_ratio,
         elastic_normal,
         elastic_shear,
+        plastic,
     )
     base = first_node(grid, position[p])
     f, wx, wy, wz = weights(grid, position[p], base)

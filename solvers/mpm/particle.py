@@ -149,6 +149,7 @@ def stressed(
     volume_ratio: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
     elastic_shear: wp.array(dtype=wp.vec3),
+    plastic: wp.array(dtype=float),
 ):
     """Strain and stress of particle p in a step, kept if it is `on`; what it gives to a node one cell farther along
     each axis beyond its momentum: the columns of (m C - 4 dt V0 tau / dx^2) dx [kg m/s] (Hu et al. 2018, eq. 18). At
@@ -164,7 +165,7 @@ def stressed(
         j *= wp.max(1.0 + dt * wp.trace(c), 0.1)
         volume_ratio[p] = j
         if phase.shear_modulus > 0.0:
-            b, s, _kept = strained(phase, phase.shear_modulus, c, b, s, dt)
+            b, s, _kept = strained(phase, phase.shear_modulus, c, b, s, dt, p, plastic)
             elastic_normal[p] = b
             elastic_shear[p] = s
     if on and dt > 0.0 and (held[p] != CARRIED or drags != EXPLICIT):

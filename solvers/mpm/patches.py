@@ -146,6 +146,7 @@ def scatter(
     volume_ratio: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
     elastic_shear: wp.array(dtype=wp.vec3),
+    plastic: wp.array(dtype=float),
 ):
     """Strain and stress of each particle, then momentum and mass to the patch of its home."""
     h, end = part_of(homes, index_of(share, wp.tid()), lanes)
@@ -172,6 +173,7 @@ def scatter(
                 volume_ratio,
                 elastic_normal,
                 elastic_shear,
+                plastic,
             )
             base = first_node(grid, position[p])
             f, wx, wy, wz = weights(grid, position[p], base)

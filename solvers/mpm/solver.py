@@ -22,6 +22,7 @@ from .. import aging
 from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
+from ..flow import plastic_strains
 from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
 from ..theory import mpm_numbers, stable_dt
@@ -158,6 +159,7 @@ class SolverMPM(Solver):
         pool.add_field("volume_ratio", float, 1.0, within=(1.0 / STRETCHED, STRETCHED))
         pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
         pool.add_field("elastic_shear", wp.vec3)
+        self.strains = [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, plastic_strains(scene, pool)]
         with wp.ScopedDevice(scene.device):
             self.table = wp.zeros(blocks, dtype=int)
             self.block_of = wp.zeros(slots, dtype=int)
@@ -168,7 +170,9 @@ class SolverMPM(Solver):
         self.order = CellOrder(
             scene, pool, np.array(self.grid.dx), shift=0.5
         )  # particles of one cell share their 27 nodes
-        self.by_block = ByBlock(scene, pool, slots, implicit) if scene.device.is_cpu and backend == "warp" else None
+        self.by_block = (
+            ByBlock(scene, pool, self.strains, slots, implicit) if scene.device.is_cpu and backend == "warp" else None
+        )
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
         self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots)
@@ -280,7 +284,7 @@ class SolverMPM(Solver):
                 hours.exit,
                 self.table,
             ],
-            [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, raw, pool.fault],
+            [*self.strains, raw, pool.fault],
         )
 
     def grid_step(self) -> None:

@@ -88,6 +88,7 @@ def strain(
     volume_ratio: Floats,
     elastic_normal: Vectors,
     elastic_shear: Vectors,
+    plastic: Floats,
     kept: Floats,
     pulling: Quads,
     pulled: Vectors,
@@ -105,7 +106,7 @@ def strain(
                 slope += dt[world] * slope @ slope
                 b, s, share, ratio, push = elastic_normal[i], elastic_shear[i], kept[i], volume_ratio[i], 0.0
                 if held[i] != CARRIED:
-                    b, s, share = strained(phase, phase.shear_modulus, slope, b, s, dt[world])
+                    b, s, share = strained(phase, phase.shear_modulus, slope, b, s, dt[world], i, plastic)
                     elastic_normal[i], elastic_shear[i], kept[i] = b, s, share
                     if is_solid(phase):
                         ratio *= (ti.Matrix.identity(ti.f32, 3) + dt[world] * slope).determinant()
@@ -147,6 +148,7 @@ def pull(
     volume_ratio: Floats,
     elastic_normal: Vectors,
     elastic_shear: Vectors,
+    plastic: Floats,
     kept: Floats,
     pulling: Quads,
     pulled: Vectors,

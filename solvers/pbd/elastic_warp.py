@@ -47,6 +47,7 @@ class Straining:
     volume_ratio: wp.array(dtype=float)
     elastic_normal: wp.array(dtype=wp.vec3)
     elastic_shear: wp.array(dtype=wp.vec3)
+    plastic: wp.array(dtype=float)  # strain; one zero where nothing hardens
     kept: wp.array(dtype=float)
     pulling: wp.array(dtype=wp.vec4)
     pulled: wp.array(dtype=wp.vec3)
@@ -120,7 +121,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
         ratio = data.volume_ratio[i]
         push = float(0.0)
         if data.held[i] != CARRIED:
-            b, s, kept = strained(phase, phase.shear_modulus, slope, b, s, h)
+            b, s, kept = strained(phase, phase.shear_modulus, slope, b, s, h, i, data.plastic)
             data.elastic_normal[i] = b
             data.elastic_shear[i] = s
             data.kept[i] = kept

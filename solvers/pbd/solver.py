@@ -136,8 +136,8 @@ class SolverPBD(Solver):
         if m.is_solid:
             dt = WAVE * scenario.narrowest / scenario.wave_speed
             limits.append(Bound("elastic accuracy", dt, f"{WAVE:g} L / c", "backward Euler damps waves"))
-        elif m.youngs_modulus is not None and m.relaxation_time is None and m.flow_threshold > 0:
-            dt = d * math.sqrt(SHAKEN * m.density / m.flow_threshold)
+        elif m.youngs_modulus is not None and m.relaxation_time is None and m.strength > 0:
+            dt = d * math.sqrt(SHAKEN * m.density / m.strength)
             limits.append(Bound("yield push", dt, f"d sqrt({SHAKEN:g} rho / tau_y)", "measured"))
         return limits
 

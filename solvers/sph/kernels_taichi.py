@@ -216,6 +216,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         elastic_normal: Vectors,
         elastic_shear: Vectors,
         off_linear: Vectors,
+        plastic: Floats,
         new_density: Floats,
         state: Quads,
         shift: Vectors,
@@ -249,7 +250,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                             approach -= rho * growth[i]
                     if held[i] != CARRIED:
                         kept = 1.0
-                        b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h)
+                        b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h, i, plastic)
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
                         z = kept * (z + h * (0.5 * (gradient - gradient.transpose()) @ z + off))
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z

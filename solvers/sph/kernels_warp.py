@@ -53,6 +53,7 @@ class Straining:
     elastic_normal: wp.array(dtype=wp.vec3)
     elastic_shear: wp.array(dtype=wp.vec3)
     off_linear: wp.array(dtype=wp.vec3)
+    plastic: wp.array(dtype=float)  # strain; one zero where nothing hardens
     new_density: wp.array(dtype=float)
     state: wp.array(dtype=wp.vec4)  # rows of `force`
     shift: wp.array(dtype=wp.vec3)
@@ -224,7 +225,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             z = whole * data.off_linear[i]
             q = (whole / rho) * (wp.vec3(sums[22], sums[23], sums[24]) - gradient * first_moment)
             if data.held[i] != CARRIED:
-                b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h)
+                b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h, i, data.plastic)
                 flows = kept < 1.0 or phase.shear_modulus <= 0.0
                 z = off_linear(z, gradient, q, kept, h)
                 data.elastic_normal[i] = b

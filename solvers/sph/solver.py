@@ -21,6 +21,7 @@ from .. import aging
 from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
+from ..flow import plastic_strains
 from ..lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
@@ -229,6 +230,7 @@ class SolverSPH(Solver):
         self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
         self.straining.shift = self.shift
         self.straining.growth = self.growth
+        self.straining.plastic = plastic_strains(scene, pool)
         for name, array in zip(STRAINS, self._strains(), strict=True):
             setattr(self.straining, name, array)
         self.forcing.forces, self.forcing.acceleration = scene.force, self.acceleration

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fluidbench.native.simulation import Simulation
+from solvers.readout import shear_stress
 
 from ..conftest import scenario
 
@@ -102,3 +103,21 @@ def test_gravity_is_felt_in_full(method):
     sim.scene.force.assign(force)
     a = gained(sim, 1e-3)[middle]
     assert a == pytest.approx(np.tile([0.0, 1.0, -3.0], (middle.sum(), 1)), abs=1e-3)
+
+
+@pytest.mark.parametrize("method", ["mpm", "sph", "pbd"])
+def test_what_has_yielded_before_yields_later(method):
+    """A shear of 0.1 in a step: stress returns to the yield stress that plastic strain has raised, and raises it on."""
+    before, shear, dt = 0.1, 100.0, 1e-3
+    law = {"youngs_modulus": 2.6e4, "yield_stress": 100.0, "saturated_yield_stress": 700.0, "hardening": 10.0}
+    sim, z, middle = layer(method, **law)  # G = 10 kPa: a trial stress of 1 kPa
+    put(sim, "plastic_strain", np.full(len(z), before))
+    put(sim, "velocity", shear * z, 0)
+    if method == "mpm":
+        sim.pool.affine.assign(np.tile(np.float32([[0, 0, shear], [0, 0, 0], [0, 0, 0]]), (len(z), 1, 1)))
+    sim.march(dt, 1)
+    tau = shear_stress(sim.scene, sim.pool)
+    assert tau is not None
+    assert tau[middle] == pytest.approx(700.0 - 600.0 * np.exp(-10.0 * before), rel=1e-2)
+    more = sim.pool.plastic_strain.numpy()[middle] - before
+    assert more == pytest.approx((0.1 - tau[middle].mean() / 1e4) / np.sqrt(3.0), rel=2e-2)

@@ -80,6 +80,7 @@ CASES = {
     ),  # 5 cells of MPM: the grid's period begins within a block
     "solid": tank(SOLID, CLOSED),
     "curing": tank(PASTE | {"cure": {"kind": "linear", "time": 0.1, "youngs_modulus": 1e5, "yield_stress": 500.0}}),
+    "hardening": tank(PASTE | {"saturated_yield_stress": 500.0, "hardening": 5.0}),
     "growing": tank(PASTE | {"expansion": {"ratio": 3.0, "time": 0.1}}, pool=9000),
 }
 SEEDS = (1, 2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solvers import smoothing
-from solvers.constitutive import flow_stress, pressure, relieved, strain_and_flow
+from solvers.constitutive import flow_stress, hardened, plastic_strain, pressure, relieved, strain_and_flow
 
 exact = lambda value: pytest.approx(value, rel=1e-12)  # noqa: E731
 
@@ -155,3 +155,36 @@ def test_the_spline_by_hand():
     assert smoothing.quadratic_spline(0.5) == exact((0.5, 0.5, 0.0))
     assert smoothing.quadratic_spline(1.0) == exact((0.125, 0.75, 0.125))
     assert smoothing.quadratic_spline(1.25) == exact((0.03125, 0.6875, 0.28125))
+
+
+@pytest.mark.parametrize(
+    ("strain", "expected"), [(0.0, 100.0), (math.log(2.0) / 8.0, 250.0), (math.log(4.0) / 8.0, 325.0), (1e9, 400.0)]
+)
+def test_yield_stress_saturates_with_plastic_strain(strain, expected):
+    assert hardened(100.0, 400.0, 8.0, strain) == exact(expected)
+
+
+def test_plastic_strain_of_a_step_is_what_its_stress_fell_short_of():
+    """Simple shear of an unstrained point by 0.3: b_xy = 0.3, trial stress G sqrt(J2(b)), and det b is 1 again."""
+    shear, threshold = 200.0, 30.0
+    gradient = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    *b, keep = strain_and_flow(*gradient, *components(np.eye(3)), shear, threshold, 0.0, 1.0, 0.0, 1.0)
+    trial = matrix(components(np.array([[1.09, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]])))
+    s = trial - np.trace(trial) / 3 * np.eye(3)
+    tau = shear * math.sqrt(0.5 * (s * s).sum())
+    lost = (tau - threshold) / (shear * np.trace(trial) / 3)
+    assert plastic_strain(*b, keep) == pytest.approx(lost / math.sqrt(3.0), rel=1e-6)
+    assert plastic_strain(*components(np.eye(3)), 1.0) == 0.0
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_uniaxial_strain_is_elastic_and_plastic_and_stress_follows_the_second(way):
+    """A bar drawn out or pressed by 30 %: logarithmic strains add up, and its stress is sqrt(3) the hardened yield."""
+    shear, steps, total = 1e6, 3000, 0.3
+    e, b, eps = way * total / steps, components(np.eye(3)), 0.0
+    for _ in range(steps):
+        threshold = hardened(100.0, 1000.0, 10.0, eps)
+        *b, keep = strain_and_flow(-e / 2, 0, 0, 0, -e / 2, 0, 0, 0, e, *b, shear, threshold, 0.0, 1.0, 0.0, 1.0)
+        eps += plastic_strain(*b, keep)
+    assert eps + abs(0.5 * math.log(b[2])) == pytest.approx(total, rel=2e-3)
+    assert way * shear * (b[2] - b[0]) == pytest.approx(math.sqrt(3.0) * hardened(100.0, 1000.0, 10.0, eps), rel=2e-3)

@@ -78,6 +78,7 @@ def test_material_at_a_degree_a_level_and_an_age():
 
 
 CURE = {"delay": 1.0, "youngs_modulus": 1e4}
+HARDENS = {"hardening": 9.0, "saturated_yield_stress": 0.2}
 WRONG = [
     ({"sound_speed": 1.0, "bulk_modulus": 1.0}, "not both"),
     ({"yield_stress": 1.0}, "need youngs_modulus"),
@@ -89,6 +90,12 @@ WRONG = [
     ({"youngs_modulus": 1.0, "cure": CURE, "expansion": {"ratio": 2.0, "delay": 1.1}}, "comes before"),
     ({"cure": {"yield_stress": 1.0}}, "needs a youngs_modulus"),
     ({"cure": CURE}, "needs bulk_modulus or sound_speed"),
+    ({"youngs_modulus": 1.0, "yield_stress": 0.1, "hardening": 9.0}, "belong together"),
+    ({"youngs_modulus": 1.0, "yield_stress": 0.1, "saturated_yield_stress": 0.2}, "belong together"),
+    ({"youngs_modulus": 1.0, "hardening": 9.0, "saturated_yield_stress": 0.2}, "needs a yield_stress above 0"),
+    ({"youngs_modulus": 1.0, "yield_stress": 0.3} | HARDENS, "fresh, .* = 0.2 lies below yield_stress = 0.3"),
+    ({"youngs_modulus": 1.0, "yield_stress": 0.1, "cure": {"yield_stress": 0.3}} | HARDENS, "cured, .* = 0.2 lies"),
+    ({"youngs_modulus": 1.0, "yield_stress": 0.1, "cure": {"saturated_yield_stress": 0.3}}, "needs hardening"),
     ({"poisson_ratio": -1.0}, "greater than -1"),
     ({"poisson_ratio": 0.5}, "less than 0.5"),
     ({"density": 0.0}, "greater than 0"),
@@ -113,6 +120,8 @@ def test_materials_at_the_edge_of_sense_are_accepted():
     material(bulk_modulus=1e4, cure={"youngs_modulus": 1e4, "yield_stress": 1.0})
     material(sound_speed=10.0, cure=CURE)
     material(cure={"viscosity": 10.0})
+    assert material(youngs_modulus=1.0, yield_stress=0.1, **HARDENS).strength == 0.2
+    assert material(youngs_modulus=1.0, yield_stress=0.2, **HARDENS).flow_threshold == 0.2
     assert material(poisson_ratio=-0.99).poisson_ratio == -0.99
 
 

@@ -115,7 +115,7 @@ def test_families_spread_about_their_own_centres():
 
 
 LEVELS = {f"layer_{k}_{what}": value for k in (1, 2, 3) for what, value in (("level_m", 0.01), ("continuity", 1.0))}
-GOOD = {**LEVELS, "print_height_m": 0.027, "print_standing": 1.0}
+GOOD = {**LEVELS, "print_height_m": 0.027, "print_standing": 1.0, "wall_lean_m": 0.0, "foot_width_m": 0.02}
 
 
 def judged(made=None, after=(1.0, 1.0), end=20.0, **changes):
@@ -134,6 +134,7 @@ def failed(**changes):
 
 
 HEIGHT, STANDS, LAID = "height over plan", "share of the path that stands", "layers laid"
+LEANS = "lean over the foot's width"
 
 
 @pytest.mark.parametrize(
@@ -146,6 +147,8 @@ HEIGHT, STANDS, LAID = "height over plan", "share of the path that stands", "lay
         ({"print_height_m": 0.7499 * 0.027}, Print.COLLAPSED, [HEIGHT]),
         ({"print_standing": 0.95}, Print.SOUND, []),
         ({"print_standing": 0.949}, Print.COLLAPSED, [STANDS]),
+        ({"wall_lean_m": 0.0099}, Print.SOUND, []),
+        ({"wall_lean_m": 0.0100}, Print.COLLAPSED, [LEANS]),
         ({"layer_2_continuity": 0.95}, Print.SOUND, []),
         ({"layer_2_continuity": 0.949}, Print.BROKEN, ["continuity of the worst layer"]),
         ({"layer_3_level_m": None}, Print.INCOMPLETE, [LAID]),
@@ -179,11 +182,34 @@ def test_criteria_say_what_was_measured_and_what_is_wanted():
         HEIGHT: (0.5, "1 ± 0.25"),
         STANDS: (0.5, ">= 0.95"),
         "continuity of the worst layer": (0.7, ">= 0.95"),
+        LEANS: (0.0, "< 0.5"),
         "sunk after the last layer": (0.2, "<= 0.05"),
     }
     assert judged(end=3.1)[1]["path travelled"].measured == pytest.approx(0.5)
     none = judged(**{f"layer_{k}_level_m": None for k in (1, 2, 3)})[1]
     assert none["continuity of the worst layer"].measured == 0.0
+
+
+def test_posture_is_that_of_the_middle_of_the_path():
+    """Of layer 2 of a wall 200 mm long: half of it 4 mm off the path, its start 1 m, and what is not laid farther."""
+    s = wall(0.2)
+    start = s.track.time[:-1][s.track.layer == 1][0]
+    made = frame([[0.1, 0.0, 0.0], [0.1, 0.01, 0.0], [0.1, 0.004, 0.0], [0.15, 0.004, 0.0], [0.0, 1.0, 0.0]], 0.0)
+    made["birth_time"][2:] = start + 0.01
+    found = tower.wall_posture(made, s)
+    assert found == pytest.approx({"wall_lean_m": 0.005, "foot_width_m": math.sqrt(12.0) * 0.005})
+    assert tower.is_wall(s) and not tower.is_wall(RING)
+
+
+def test_a_wall_collapses_under_the_layers_that_lie_whole():
+    s = wall()
+    ends = [s.track.time[1:][s.track.layer == k][-1] for k in range(3)]
+    times = [0.0, 0.5 * ends[0], 1.01 * ends[0], 1.01 * ends[1], 1.1 * ends[2]]
+    standing = {"time_s": times, "foot_width_m": [0.0, 0.02, 0.02, 0.02, 0.02], "wall_lean_m": [0.0] * 5}
+    heights = [0.0, 0.0, 0.009, 0.018, 0.027]
+    assert tower.wall_collapse(s, pd.DataFrame(standing | {"print_height_m": heights})) is None
+    fallen = tower.wall_collapse(s, pd.DataFrame(standing | {"print_height_m": [*heights[:3], 0.013, 0.01]}))
+    assert fallen is not None and (fallen.time, fallen.layers) == (times[3], 2)
 
 
 @pytest.mark.parametrize(("radius", "met"), [(0.0549, True), (0.0551, False), (0.0451, True), (0.0449, False)])

@@ -206,6 +206,7 @@ def test_a_print_that_stands_but_sinks_is_deformed():
         "mass": np.full(len(points), volume * 1000.0),
         "held": np.full(len(points), FREE),
         "phase": np.zeros(len(points), int),
+        "birth_time": births,
     }
     verdict, _, criteria = judged(s, points * [1, 1, 0.9], volume, births, before=fresh)
     assert verdict is Print.DEFORMED
