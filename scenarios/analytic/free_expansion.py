@@ -76,5 +76,5 @@ CASE = Case(
     tolerance=0.02,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "disorder reads as a surface that is not there, and pushes: thirtyfold 0.06 at R / 4"},
+    exempt={"pbd": "disorder of halves reads as density, which pushes: thirtyfold 0.06 at R / 4"},
 )

@@ -8,7 +8,7 @@ from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import FRICTION, PERIODIC
 
 from ..images import WALL_INSET
-from ..neighbours_taichi import BoxT, ListsT, contained, walled
+from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, walled
 from ..pairs_taichi import over_pairs, reader, vector_at, vector_into
 from ..smoothing import cusp
 from ..taichi_bridge import (
@@ -27,7 +27,7 @@ from ..taichi_bridge import (
     too_fast,
     vec4,
 )
-from .elastic_taichi import KERNELS, NumbersT, sloping
+from .elastic_taichi import KERNELS, NumbersT, gradient, sloping
 from .kernels_warp import CROWDED, DRAWN, FARTHEST, HURRIED, NEAREST, PARTED, SLACK, SLACK_SOLID
 from .numbers import PLACE, PUSH
 
@@ -103,6 +103,7 @@ def multipliers(
     phase_of: Ints,
     held: Ints,
     mass: Floats,
+    motion: Vectors,
     pushes: Quads,
     fill: Floats,
     correction: Vectors,
@@ -125,19 +126,27 @@ def multipliers(
                 wave = dt[world] / num.spacing
                 compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
                 multiplier += DRAWN * even * within * ti.max(1.0 - SLACK - dense, 0.0) / (metric + compliance)
-            pushes[2 * i] = places[i]
-            pushes[2 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), 0.0, 0.0)
+            pushes[3 * i] = places[i]
+            pushes[3 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), 0.0, 0.0)
+            pushes[3 * i + 2] = vec4(motion[i][0], motion[i][1], motion[i][2], 0.0)
+
+
+@ti.func
+def pushing_seen(box, extra: ti.template(), row, j, code):
+    return vector_into(row, 8, image_gradient(box, vector_at(row, 8), code))
 
 
 @ti.func
 def correct_pair(num, own, begun, other, r):
     share, mass = 2.0 * other[5] / (own[5] + other[5]), other[3] * other[5]
-    push = share * (own[4] + other[4]) * num.slope_weight * sloping(num, other, r)
-    lap = ti.max(NEAREST * num.spacing / ti.max(r.norm(), 1.0e-9) - 1.0, 0.0)
-    return push + PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing) * r
+    push = share * (own[4] + other[4]) * num.slope_weight * other[3] * gradient(r.norm(), num.support)
+    lap = ti.max(NEAREST * num.spacing - r.norm(), 0.0)
+    push += PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing)
+    before = r - (vector_at(own, 8) - vector_at(other, 8))
+    return push / ti.max(before.norm(), 1.0e-9) * before
 
 
-corrected_by = over_pairs(PUSH, 3, correct_pair)
+corrected_by = over_pairs(PUSH, 3, correct_pair, pushing_seen)
 
 
 @ti.kernel
@@ -156,6 +165,7 @@ def correct(
     phase_of: Ints,
     held: Ints,
     mass: Floats,
+    motion: Vectors,
     pushed: Quads,
     fill: Floats,
     correction: Vectors,

@@ -18,11 +18,11 @@ from fluidbench.native.scene import Box, Force, Phase, force_at, is_solid, too_f
 from fluidbench.native.vector_access import store_vec4
 
 from ..bind import warp_func
-from ..images import WALL_INSET, contained, walled
+from ..images import WALL_INSET, contained, image_gradient, walled
 from ..pairs import Pass, floats
 from ..smoothing import cusp
 from ..tool import Tool, felt, outside
-from .elastic_warp import KERNELS, elastic, sloping
+from .elastic_warp import KERNELS, elastic, gradient, sloping
 from .numbers import PLACE, PUSH, Numbers
 from .walls import pushed, wall_friction
 
@@ -89,6 +89,7 @@ class Constraining:
     phase_of: wp.array(dtype=int)
     held: wp.array(dtype=int)
     mass: wp.array(dtype=float)
+    motion: wp.array(dtype=wp.vec3)
     pushes: wp.array(dtype=wp.vec4)
     fill: wp.array(dtype=float)
     correction: wp.array(dtype=wp.vec3)
@@ -126,9 +127,10 @@ def multiplier_finish(
         wave = data.dt[world] / num.spacing
         compliance = num.iterations * data.mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
         multiplier += DRAWN * lack / (metric + compliance)
-    store_vec4(data.pushes, 2 * i, wp.vec4(own[0], own[1], own[2], own[3]))
-    heft = data.mass[i] / (own[3] * phase.density)
-    store_vec4(data.pushes, 2 * i + 1, wp.vec4(multiplier, heft, 0.0, 0.0))
+    store_vec4(data.pushes, 3 * i, wp.vec4(own[0], own[1], own[2], own[3]))
+    heft, moved = data.mass[i] / (own[3] * phase.density), data.motion[i]
+    store_vec4(data.pushes, 3 * i + 1, wp.vec4(multiplier, heft, 0.0, 0.0))
+    store_vec4(data.pushes, 3 * i + 2, wp.vec4(moved[0], moved[1], moved[2], 0.0))
 
 
 @wp.func
@@ -153,12 +155,23 @@ them: 2 to 5 %. Sums: density, gradient of the own place (3), squares of the oth
 
 
 @wp.func
+def seen_pushing(box: Box, data: Constraining, row: floats(PUSH), j: int, code: int):
+    moved = image_gradient(box, wp.vec3(row[8], row[9], row[10]), code)
+    for axis in range(3):
+        row[8 + axis] = moved[axis]
+    return row
+
+
+@wp.func
 def correct_pair(num: Numbers, own: floats(PUSH + 4), other: floats(PUSH), r: wp.vec3):
+    distance = wp.length(r)
     share = 2.0 * other[5] / (own[5] + other[5])
-    push = (share * (own[4] + other[4]) * num.slope_weight) * sloping(num, other[3], r)
-    lap = wp.max(NEAREST * num.spacing / wp.max(wp.length(r), 1.0e-9) - 1.0, 0.0)
+    push = (share * (own[4] + other[4]) * num.slope_weight) * other[3] * gradient(distance, num.support)
+    lap = wp.max(NEAREST * num.spacing - distance, 0.0)
     mass = other[3] * other[5]
-    return push + (PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing)) * r
+    push += PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing)
+    before = r - wp.vec3(own[8] - other[8], own[9] - other[9], own[10] - other[10])
+    return (push / wp.max(wp.length(before), 1.0e-9)) * before
 
 
 @wp.func
@@ -177,10 +190,11 @@ def tooled_correct_finish(
     correct_finish(num, box, data, world, i, own, sums + (2.0 * own[4] * num.slope_weight) * found.first)
 
 
-correct = Pass(Numbers, Constraining, PUSH, 3, correct_pair, correct_finish)
+correct = Pass(Numbers, Constraining, PUSH, 3, correct_pair, correct_finish, seen=seen_pushing)
 """Position correction (eq. 12), and of pairs that are too near (Mueller et al. 2007, J. Vis. Commun. Image R. 18:109),
 as one simultaneous Jacobi step. Of two the lighter moves more, such that momentum stays: V_i rho_i dx_i = - V_j rho_j
-dx_j. Sums over spacing squared."""
+dx_j. They part along the line between them as the substep began, as bonds do in SHAKE (Ryckaert et al. 1977): with v =
+(x - x0) / dt, m x cross v is m x0 cross v, and stays. Sums over spacing squared."""
 
 
 @wp.kernel

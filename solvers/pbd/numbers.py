@@ -25,8 +25,9 @@ class Numbers:
 
 
 # Floats in the rows that neighbours are asked for. Of density: position, volume. Of its constraints: the same |
-# multiplier, heft. Of velocities: the same | velocity. Of stress: the same | stress (9).
-PLACE, PUSH, MOVING, PULLING = 4, 8, 8, 16
+# multiplier, heft | motion since the substep began. Of velocities: position, volume | velocity. Of stress: the same |
+# stress (9).
+PLACE, PUSH, MOVING, PULLING = 4, 12, 8, 16
 
 
 def distances(support_ratio: float) -> np.ndarray:

@@ -168,6 +168,7 @@ class SolverPBD(Solver):
         self.constraining.phase_of = pool.phase
         self.constraining.held, self.constraining.mass = pool.held, pool.mass
         self.constraining.correction = self.correction
+        self.constraining.motion = self.motion
         self.constraining.pushes, self.constraining.fill = self.pushes, self.fill
         self.elastic = Elasticity(scene, pool) if scene.elastic else None
         self.tool = None if scene.outline is None else tool_of(scene, self.num.support, weights(self.num.support))
@@ -225,8 +226,8 @@ class SolverPBD(Solver):
         self.refresh()
         spans = self.scene.dt.numpy().copy()
         self.scene.dt.fill_(INSTANT * self.scene.spacing)
-        self.predict()
         for _ in range(SETTLING):
+            self.predict()
             self.lists()  # what moves far in one iteration has other neighbours in the next
             self.constrain(1)
         self.refresh()

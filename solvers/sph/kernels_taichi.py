@@ -10,7 +10,7 @@ from fluidbench.native.scene import PERIODIC
 
 from ..aging import DISORDER
 from ..corrected import SOUND
-from ..corrected_taichi import elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
+from ..corrected_taichi import elastic_stress, least_eigenvalue, mirrored_stress, reproduced, symmetric_inverse
 from ..flow_taichi import pressure, shear_rate, strained
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_traction, image_velocity
@@ -234,12 +234,13 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
                 second, approach, sheared, flows, h = 0.0, 0.0, 0.0, True, dt[world]
-                gradient, correction = mat3(0.0), ti.Matrix.identity(ti.f32, 3)
+                gradient, correction, linear = mat3(0.0), ti.Matrix.identity(ti.f32, 3), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
                 if ti.static(strength):
                     moment = symmetric_at(sums, 16)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
+                    linear = reproduced(moment / rho, correction)
                     gradient = stressed(sums, 7) @ correction / rho
                     approach = -rho * gradient.trace()
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
@@ -250,11 +251,11 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                             approach -= rho * growth[i]
                     if held[i] != CARRIED:
                         kept = 1.0
-                        b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h, i, plastic)
+                        b, s, kept = strained(phase, phase.shear_modulus, linear @ gradient, b, s, h, i, plastic)
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
                         z = kept * (z + h * (0.5 * (gradient - gradient.transpose()) @ z + off))
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
-                    sheared = shear_rate(gradient)
+                    sheared = shear_rate(linear @ gradient)
                 else:
                     second, approach = sums[7], sums[8]
                     sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
@@ -273,16 +274,16 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 rho = ti.max(rho, FLOOR * rest)
                 new_density[i] = rho
                 p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-                scale = 1.0
-                if ti.static(not changing):
-                    scale = 1.0 / (rho * rho)
+                scale = 1.0 / (rho * rho)
+                if ti.static(changing):
+                    scale *= rest
                 row = ti.Vector.zero(ti.f32, width)
                 for c in ti.static(range(7)):
                     row[c] = own[c]
                 if ti.static(strength):
                     damping = 0.1 * num.artificial_viscosity * num.h * sound * rho
                     pull = num.compact * (num.hourglass * phase.shear_modulus * z + damping * off)
-                    cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
+                    cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p, linear)
                     cauchy -= pull.outer_product(first_moment / own[7])
                     row = matrix_into(row, 7, scale * (cauchy @ correction))
                     row = vector_into(row, 16, scale * pull)
@@ -307,7 +308,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         r2, ur, tiny = r.norm_sqr(), u.dot(r), 0.01 * num.h * num.h
         q = ti.sqrt(r2) / num.h
         shock, drag = begun[0], begun[1]
+        mine, theirs = 1.0, 1.0
         if ti.static(changing):
+            mine, theirs = 1.0 / other[last + 1], 1.0 / own[last + 1]
             # means of both partners, for both must find the same force
             fast = 0.5 * (own[last + 3] + other[last + 3])
             shock = num.artificial_viscosity * num.h * fast / ti.max(own[last], other[last])
@@ -316,13 +319,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         along = 0.0  # what acts along the line of centres
         push = vec3(0.0)
         if ti.static(strength):
-            push = (stressed(own, 7) + stressed(other, 7)) @ r + vector_at(other, 16) - vector_at(own, 16)
-            if ti.static(changing):
-                push /= own[last] * other[last]
+            push = (mine * stressed(own, 7) + theirs * stressed(other, 7)) @ r
+            push += theirs * vector_at(other, 16) - mine * vector_at(own, 16)
         else:
-            pressures = own[7] + other[7]
-            if ti.static(changing):
-                pressures /= own[last] * other[last]
+            pressures = mine * own[7] + theirs * other[7]
             along = shock * ti.min(ur, 0.0) / (r2 + tiny) - pressures
         if ti.static(viscous):
             along += drag * ur / (r2 + 0.01 * tiny)

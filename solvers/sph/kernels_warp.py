@@ -18,7 +18,7 @@ from fluidbench.native.vector_access import store_vec4
 
 from ..aging import rest_density
 from ..bind import warp_func
-from ..corrected import SOUND, elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
+from ..corrected import SOUND, elastic_stress, least_eigenvalue, mirrored_stress, reproduced, symmetric_inverse
 from ..flow import pressure, shear_rate, strained
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
@@ -203,7 +203,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         crowd = wp.vec3(sums[4], sums[5], sums[6])
         second, inflow, strain = float(0.0), float(0.0), float(0.0)
         flows = bool(True)
-        gradient, correction = wp.mat33(), wp.mat33()
+        gradient, correction, seen = wp.mat33(), wp.mat33(), wp.mat33()
         if wp.static(strength):
             # density from the corrected gradient, too: the same strain for pressure and for shear
             moment = wp.mat33(
@@ -214,6 +214,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             gradient = wp.mat33(
                 sums[7], sums[8], sums[9], sums[10], sums[11], sums[12], sums[13], sums[14], sums[15]
             )  # fmt: skip
+            seen = reproduced(moment / rho, correction)
             gradient = gradient * correction / rho
             inflow = -rho * wp.trace(gradient)
             b = data.elastic_normal[i]
@@ -225,13 +226,13 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             z = whole * data.off_linear[i]
             q = (whole / rho) * (wp.vec3(sums[22], sums[23], sums[24]) - gradient * first_moment)
             if data.held[i] != CARRIED:
-                b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h, i, data.plastic)
+                b, s, kept = strained(phase, phase.shear_modulus, seen * gradient, b, s, h, i, data.plastic)
                 flows = kept < 1.0 or phase.shear_modulus <= 0.0
                 z = off_linear(z, gradient, q, kept, h)
                 data.elastic_normal[i] = b
                 data.elastic_shear[i] = s
                 data.off_linear[i] = z
-            strain = h * shear_rate(gradient)
+            strain = h * shear_rate(seen * gradient)
         else:
             second = sums[7]
             inflow = sums[8]
@@ -253,7 +254,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
         scale = 1.0 / (rho * rho)
         if wp.static(changing):
-            scale = 1.0  # partners of another density: see `force_pass`
+            scale *= rest  # over that of the partner: see `force_pass`
         at = i * state_of
         store_vec4(data.state, at, wp.vec4(own[0], own[1], own[2], own[3]))
         if wp.static(strength):
@@ -263,7 +264,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             damping = 0.1 * num.artificial_viscosity * num.h * sound * rho * num.compact
             pull = pulled_back(phase, num.hourglass * num.compact, damping, z, q)
             # With the correction of its gradient stress does on the particles exactly the work of the strain.
-            t = scale * ((elastic_stress(g, b, s, p) - wp.outer(pull, first_moment / own[7])) * correction)
+            t = scale * ((elastic_stress(g, b, s, p, seen) - wp.outer(pull, first_moment / own[7])) * correction)
             pull *= scale
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], t[0, 0]))
             store_vec4(data.state, at + 2, wp.vec4(t[0, 1], t[0, 2], t[1, 0], t[1, 1]))
@@ -319,7 +320,11 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
         ur = wp.dot(u, r)
         tiny = 0.01 * num.h * num.h
         shock, drag = float(own[N]), float(own[N + 1])
+        mine, theirs = float(1.0), float(1.0)
         if wp.static(changing):
+            # Stress over rho_i^2 rho0_j / rho0_i: light matter must not feel its heavy partner's mass, and the strain's
+            # sums, which are over those volumes, too, find the work that this does.
+            mine, theirs = 1.0 / other[LAST + 1], 1.0 / own[LAST + 1]
             # both partners must find the same force: means of what differs between them
             fast = own[LAST + 3] + other[LAST + 3]
             shock = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(own[LAST], other[LAST])
@@ -329,21 +334,22 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
         push = wp.vec3(0.0, 0.0, 0.0)
         if wp.static(strength):
             both = wp.mat33(
-                own[7] + other[7], own[8] + other[8], own[9] + other[9],
-                own[10] + other[10], own[11] + other[11], own[12] + other[12],
-                own[13] + other[13], own[14] + other[14], own[15] + other[15],
+                mine * own[7] + theirs * other[7], mine * own[8] + theirs * other[8], mine * own[9] + theirs * other[9],
+                mine * own[10] + theirs * other[10],
+                mine * own[11] + theirs * other[11],
+                mine * own[12] + theirs * other[12],
+                mine * own[13] + theirs * other[13],
+                mine * own[14] + theirs * other[14],
+                mine * own[15] + theirs * other[15],
             )  # fmt: skip
-            if wp.static(changing):
-                # (sigma_i + sigma_j) / (rho_i rho_j): light matter must not feel its heavy partner's mass
-                both *= 1.0 / (own[LAST] * other[LAST])
-            pull = wp.vec3(other[16] - own[16], other[17] - own[17], other[18] - own[18])
-            if wp.static(changing):
-                pull *= 1.0 / (own[LAST] * other[LAST])
+            pull = wp.vec3(
+                theirs * other[16] - mine * own[16],
+                theirs * other[17] - mine * own[17],
+                theirs * other[18] - mine * own[18],
+            )
             push = both * r + pull
         else:
-            both_pressures = own[7] + other[7]
-            if wp.static(changing):
-                both_pressures *= 1.0 / (own[LAST] * other[LAST])
+            both_pressures = mine * own[7] + theirs * other[7]
             # artificial viscosity for approaching particles (Monaghan 1992)
             along = shock * wp.min(ur, 0.0) / (r2 + tiny) - both_pressures
         if wp.static(viscous):
@@ -366,7 +372,7 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
             rho, h = data.new_density[i], data.dt[world]
             both = 2.0 * rho * found.first
             if wp.static(changing):
-                both *= 1.0 / (rho * rho)
+                both *= 1.0 / own[LAST + 1]
             if wp.static(strength):
                 a = wp.mat33(own[7], own[8], own[9], own[10], own[11], own[12], own[13], own[14], own[15]) * both
             else:

@@ -24,7 +24,7 @@ PLACE, VELOCITY = [(0, 3), (3, 4)], (4, 7)
 ROWS = {
     "matter": [*PLACE, VELOCITY, (7, 8), (8, 11), (11, 12)],
     "places": PLACE,
-    "pushes": [*PLACE, (4, 5)],
+    "pushes": [*PLACE, (4, 5), (5, 6), (8, 11)],
     "moving": [*PLACE, VELOCITY],
     "pulling": [*PLACE, (4, 13)],
 }

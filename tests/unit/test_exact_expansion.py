@@ -83,7 +83,7 @@ def test_jitter_moves_the_onset_evenly_and_children_keep_the_clock_of_their_ance
 
 
 def test_what_has_outgrown_the_spacing_is_halved_in_place():
-    """Beyond 1.5 spacing^3, as often as the generation allows; halves lie 0.5 to 0.8 edges apart about the middle."""
+    """Beyond 1.5 spacing^3, as often as the generation allows; halves lie 0.5 to 0.63 edges apart about the middle."""
     volume = np.full(64, 1.49 * D**3)
     volume[:8] = 1.51 * D**3
     volume[8] = 4.0 * D**3
@@ -107,7 +107,7 @@ def test_what_has_outgrown_the_spacing_is_halved_in_place():
     for i in halved:
         twin = children[int(before["origin"][i]) + 64 * 2 ** int(before["generation"][i])]
         arm = (after["position"][twin] - after["position"][i]).astype(float)
-        assert 0.499 < np.linalg.norm(arm) / volume[i] ** (1 / 3) < 0.801
+        assert 0.499 < np.linalg.norm(arm) / volume[i] ** (1 / 3) < 0.631
         middle = (after["position"][twin] + after["position"][i]) / 2
         assert middle == pytest.approx(before["position"][i], abs=1e-7)
         for slot in (i, twin):
