@@ -56,9 +56,9 @@ def collapse_of(
     posture at these times; None if it stands.
 
     It has where a layer lies LEANT of the foot's first width off the path, or where the wall lacks SUNK of the height
-    laid. It buckled if it leant farther than its foot had spread to either side.
+    laid. It buckled if it leant farther than its foot had spread to either side. A foot of no width says nothing yet.
     """
-    laid = [k for k, n in enumerate(layers) if n > 0]
+    laid = [k for k, n in enumerate(layers) if n > 0 and foot[k] > 0.0]
     for k in laid:
         width = foot[laid[0]]
         leant, low = lean[k] >= LEANT * width, top[k] <= (1.0 - SUNK) * height * layers[k]

@@ -100,12 +100,14 @@ def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str,
     from ..measure.order import departures, order
     from ..measure.reference import answers
     from ..measure.rest import at_rest, creep, moving
-    from ..measure.tower import is_tower, is_wall, success, verdict_of, wall_collapse
+    from ..measure.tower import Print, is_tower, is_wall, success, verdict_of, wall_collapse
 
     final = ledger(frame, scenario) | final_lengths(frame, scenario) | fed(series)
     final |= order(frame, scenario) | creep(series, scenario)
     compared, not_compared = answers(scenario, series, final)
     criteria = success(scenario, final, series) if is_tower(scenario) else []
+    printed = verdict_of(criteria) if criteria else None
+    fell = printed is Print.COLLAPSED and is_wall(scenario)
     restless = scenario.until == "rest" and not at_rest(series, scenario)
     unrest = [f"still moves after {scenario.duration:g} s, and was to be at rest"] if restless else []
     return {
@@ -114,8 +116,8 @@ def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str,
         "answers": tuple(compared),
         "not_compared": tuple(not_compared),
         "success": tuple(criteria),
-        "print": verdict_of(criteria) if criteria else None,
-        "collapse": wall_collapse(scenario, series) if is_wall(scenario) else None,
+        "print": printed,
+        "collapse": wall_collapse(scenario, series) if fell else None,
         "warnings": _numberless(final) + departures(final) + unrest,
     }
 

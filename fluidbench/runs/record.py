@@ -81,7 +81,7 @@ class Record(BaseModel):
     not_compared: tuple[str, ...] = ()  # why references do not apply
     success: tuple[Criterion, ...] = ()  # of a print
     print: Print | None = None  # what became of it
-    collapse: Collapse | None = None  # of a wall
+    collapse: Collapse | None = None  # of a wall that came down
     cost: Cost | None = None
     launches: dict[str, float] = {}
     solves: dict[str, float] = {}  # what iterative solves took, see native/solver.py

@@ -81,9 +81,7 @@ def failed_prints(results: Sequence[Run]) -> list[str]:
         if result.ok and result.record.print not in (None, Print.SOUND):
             unmet = [f"{c.name} {number(c.measured)} (wanted {c.wanted})" for c in result.record.success if not c.met]
             fall = result.record.collapse
-            how = (
-                f"by {fall.mode} at {number(fall.time)} s, on {fall.layers} whole layers; " if fall is not None else ""
-            )
+            how = f"by {fall.mode} at {number(fall.time)} s, {fall.layers} layers whole; " if fall is not None else ""
             lines.append(f"{result.label}: print {result.record.print}: {how}{'; '.join(unmet)}")
     return lines
 

@@ -46,3 +46,4 @@ def test_what_comes_down_and_how(lean, foot, top, expected):
 def test_nothing_collapses_before_anything_is_laid():
     assert collapse_of([0.0, 1.0], [0, 1], 0.01, [0.0, 0.0], [0.0, 0.02], [0.0, 0.01]) is None
     assert collapse_of([], [], 0.01, [], [], []) is None
+    assert collapse_of([0.0, 1.0], [1, 1], 0.01, [0.1, 0.0], [0.0, 0.02], [0.0, 0.01]) is None

@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 from fluidbench.measure.reference import Answer
+from fluidbench.measure.collapse import Collapse, Mode
 from fluidbench.measure.tower import Criterion, Print
 from fluidbench.paper import table1_report as table1_page
 from fluidbench.paper import table2_report as table2_page
@@ -120,6 +121,9 @@ def test_prints_that_failed_are_told_with_what_they_did_not_meet():
     assert line.startswith("mpm") and line.endswith(
         "collapsed: height 0.5123 (wanted >= 1); radius 0.25 (wanted <= 0.1)"
     )
+    fall = Collapse(1.5, 3, Mode.BUCKLING)
+    (line,) = failed_prints([finished("mpm", print="collapsed", success=unmet[:1], collapse=fall)])
+    assert line.endswith("collapsed: by buckling at 1.5 s, 3 layers whole; height 0.5123 (wanted >= 1)")
 
 
 COSTLY = {
