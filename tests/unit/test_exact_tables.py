@@ -7,8 +7,8 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from fluidbench.measure.reference import Answer
 from fluidbench.measure.collapse import Collapse, Mode
+from fluidbench.measure.reference import Answer
 from fluidbench.measure.tower import Criterion, Print
 from fluidbench.paper import table1_report as table1_page
 from fluidbench.paper import table2_report as table2_page
