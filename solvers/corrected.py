@@ -3,9 +3,7 @@
 A velocity gradient with the kernel's gradient corrected by the inverse moment B (Randles & Libersky 1996, CMAME
 139:375) makes no strain of a rigid rotation. Stress times B, summed with the plain kernel gradient over both partners
 of a pair, does on the particles exactly the work of that strain: momentum and angular momentum stay (Bonet & Lok 1999,
-CMAME 180:97). Where B has faded, T = B M is not 1: a rotation w would be seen as w T, which is a strain, and a shear
-stress s would turn the particle by that part of s T which is not symmetric. T w T is a rotation and T s T symmetric, so
-shear and its stress are both taken times T from the left; what changes volume, and pressure, are symmetric as they are.
+CMAME 180:97).
 """
 
 import warp as wp
@@ -41,20 +39,11 @@ def symmetric_inverse(m: wp.mat33):
 
 
 @wp.func
-def reproduced(m: wp.mat33, inverse: wp.mat33):
-    """T = B M, what a corrected gradient sees of a linear field; 1 where the correction has not faded."""
-    seen = wp.identity(n=3, dtype=float)
-    if least_eigenvalue(m) < SOUND:
-        seen = inverse * m
-    return seen
-
-
-@wp.func
-def elastic_stress(modulus: float, b: wp.vec3, s: wp.vec3, pressure: float, seen: wp.mat33):
-    """modulus T dev(b) - pressure 1 [Pa], the elastic tensor given by its diagonal b and by s: xy, xz, yz."""
-    m = (b[0] + b[1] + b[2]) / 3.0
-    sheared = modulus * (seen * wp.mat33(b[0] - m, s[0], s[1], s[0], b[1] - m, s[2], s[1], s[2], b[2] - m))
-    return sheared - wp.diag(wp.vec3(pressure, pressure, pressure))
+def elastic_stress(modulus: float, b: wp.vec3, s: wp.vec3, pressure: float):
+    """modulus dev(b) - pressure 1 [Pa], the elastic tensor given by its diagonal b and by s: xy, xz, yz."""
+    m = modulus * (b[0] + b[1] + b[2]) / 3.0 + pressure
+    xy, xz, yz = modulus * s[0], modulus * s[1], modulus * s[2]
+    return wp.mat33(modulus * b[0] - m, xy, xz, xy, modulus * b[1] - m, yz, xz, yz, modulus * b[2] - m)
 
 
 @wp.func

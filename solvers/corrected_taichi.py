@@ -27,19 +27,10 @@ def symmetric_inverse(m):
 
 
 @ti.func
-def reproduced(m, inverse):
-    """What a corrected gradient sees of a linear field; 1 where the correction has not faded."""
-    seen = ti.Matrix.identity(ti.f32, 3)
-    if least_eigenvalue(m) < SOUND:
-        seen = inverse @ m
-    return seen
-
-
-@ti.func
-def elastic_stress(modulus, b, s, pressure, seen):
-    """modulus T dev(b) - pressure 1 [Pa]."""
+def elastic_stress(modulus, b, s, pressure):
+    """modulus dev(b) - pressure 1 [Pa]."""
     unit = ti.Matrix.identity(ti.f32, 3)
-    return modulus * (seen @ (symmetric(b, s) - (b.sum() / 3.0) * unit)) - pressure * unit
+    return modulus * (symmetric(b, s) - (b.sum() / 3.0) * unit) - pressure * unit
 
 
 @ti.func

@@ -20,7 +20,7 @@ from fluidbench.native.vector_access import store_vec4
 
 from ..aging import rest_density
 from ..bind import warp_func
-from ..corrected import elastic_stress, mirrored_stress, reproduced, symmetric_inverse
+from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
 from ..flow import pressure, strained
 from ..images import image_velocity
 from ..pairs import Pass, floats
@@ -110,7 +110,6 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
             sums[9], sums[12], sums[13], sums[12], sums[10], sums[14], sums[13], sums[14], sums[11]
         )  # fmt: skip
         correction = symmetric_inverse(moment)
-        seen = reproduced(moment, correction)
         slope = wp.mat33(
             sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]
         )  # fmt: skip
@@ -122,7 +121,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
         ratio = data.volume_ratio[i]
         push = float(0.0)
         if data.held[i] != CARRIED:
-            b, s, kept = strained(phase, phase.shear_modulus, seen * slope, b, s, h, i, data.plastic)
+            b, s, kept = strained(phase, phase.shear_modulus, slope, b, s, h, i, data.plastic)
             data.elastic_normal[i] = b
             data.elastic_shear[i] = s
             data.kept[i] = kept
@@ -131,7 +130,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
                 data.volume_ratio[i] = ratio
         if is_solid(phase):
             push = pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-        stress = elastic_stress(data.kept[i] * phase.shear_modulus, b, s, push, seen) * correction
+        stress = elastic_stress(data.kept[i] * phase.shear_modulus, b, s, push) * correction
     store_vec4(data.pulling, 4 * i, wp.vec4(own[0], own[1], own[2], own[3]))
     store_vec4(data.pulling, 4 * i + 1, wp.vec4(stress[0, 0], stress[0, 1], stress[0, 2], stress[1, 0]))
     store_vec4(data.pulling, 4 * i + 2, wp.vec4(stress[1, 1], stress[1, 2], stress[2, 0], stress[2, 1]))

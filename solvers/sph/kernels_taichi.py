@@ -10,7 +10,7 @@ from fluidbench.native.scene import PERIODIC
 
 from ..aging import DISORDER
 from ..corrected import SOUND
-from ..corrected_taichi import elastic_stress, least_eigenvalue, mirrored_stress, reproduced, symmetric_inverse
+from ..corrected_taichi import elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
 from ..flow_taichi import pressure, shear_rate, strained
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_traction, image_velocity
@@ -234,13 +234,12 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
                 second, approach, sheared, flows, h = 0.0, 0.0, 0.0, True, dt[world]
-                gradient, correction, linear = mat3(0.0), ti.Matrix.identity(ti.f32, 3), mat3(0.0)
+                gradient, correction = mat3(0.0), ti.Matrix.identity(ti.f32, 3)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
                 if ti.static(strength):
                     moment = symmetric_at(sums, 16)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
-                    linear = reproduced(moment / rho, correction)
                     gradient = stressed(sums, 7) @ correction / rho
                     approach = -rho * gradient.trace()
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
@@ -251,11 +250,11 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                             approach -= rho * growth[i]
                     if held[i] != CARRIED:
                         kept = 1.0
-                        b, s, kept = strained(phase, phase.shear_modulus, linear @ gradient, b, s, h, i, plastic)
+                        b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h, i, plastic)
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
                         z = kept * (z + h * (0.5 * (gradient - gradient.transpose()) @ z + off))
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
-                    sheared = shear_rate(linear @ gradient)
+                    sheared = shear_rate(gradient)
                 else:
                     second, approach = sums[7], sums[8]
                     sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
@@ -283,7 +282,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 if ti.static(strength):
                     damping = 0.1 * num.artificial_viscosity * num.h * sound * rho
                     pull = num.compact * (num.hourglass * phase.shear_modulus * z + damping * off)
-                    cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p, linear)
+                    cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     cauchy -= pull.outer_product(first_moment / own[7])
                     row = matrix_into(row, 7, scale * (cauchy @ correction))
                     row = vector_into(row, 16, scale * pull)

@@ -160,7 +160,7 @@ def test_a_strand_that_grows_across_a_periodic_axis_stays_where_it_is_and_keeps_
     assert mass @ across / mass.sum() == pytest.approx(np.zeros(2), abs=5e-4)
     (x, z), (u, w) = across.T, after["velocity"][:, ::2].astype(float).T
     turning = mass @ (x * w - z * u) / (mass @ (x * x + z * z))
-    assert abs(turning) < (0.2 if method == "sph" else 0.01)  # rad/s; PBD spun up exponentially, to 0.7
+    assert abs(turning) < (0.12 if method == "sph" else 0.01)  # rad/s; PBD spun up exponentially, to 0.7
     section = np.sqrt(np.linalg.det(np.cov(across.T, aweights=mass)))
     start = np.sqrt(np.linalg.det(np.cov(before["position"][:, ::2].astype(float).T)))
     grown = float(after["volume"].sum() / before["volume"].sum())
