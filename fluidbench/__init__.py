@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .study.compare import compare, run
     from .study.select import select
     from .study.stability import stability
+    from .study.sweep import sweep
     from .study.validate import validate
 
 __version__ = "0.1.0"
@@ -42,6 +43,7 @@ __all__ = [
     "run",
     "select",
     "stability",
+    "sweep",
     "table1",
     "table2",
     "validate",
@@ -60,6 +62,7 @@ _ROOMS = {
     "run": "study.compare",
     "validate": "study.validate",
     "stability": "study.stability",
+    "sweep": "study.sweep",
     "bench": "study.bench",
     "ablate": "study.ablate",
     "select": "study.select",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..study.workplace import Options
 
 MOST_REPEATS = 1000
+MOST_VALUES = 1000  # of a key of a sweep
 SHORTEST, LONGEST = 1e-3, 3.2e7  # wall time that a run may be given [s]
 ScenarioName = Annotated[str, typer.Argument(help="a shipped scenario (see `fluidbench list`) or a TOML file")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="override a key, e.g. material.yield_stress=50")]
@@ -86,6 +87,9 @@ MeasuredFile = Annotated[
         help="what was measured on a real print: CSV with quantity, value and, where known, uncertainty, layer, place",
         show_default=False,
     ),
+]
+Seed = Annotated[
+    int, typer.Option(min=0, help="shift what bodies begin with at random, by up to a twentieth of a spacing; 0: not")
 ]
 Shorter = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter and coarser version")]
 Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
@@ -221,3 +225,43 @@ def budget_of(text: str | None) -> tuple[float, float]:
     if not SHORTEST <= value <= LONGEST:
         raise UserError(f"--budget takes a time such as 60s, 5m or 1h, or realtime; got {quoted(text)}")
     return value, math.inf
+
+
+def axes_of(given: list[str]) -> dict[str, list[Any]]:
+    """['a.b=20:200:5', 'c=1,2'] -> {'a.b': [20, 65, 110, 155, 200], 'c': [1, 2]}; raises UserError for what is none."""
+    axes: dict[str, list[Any]] = {}
+    for text in given:
+        key, equals, values = text.partition("=")
+        key = key.strip()
+        if not equals or not key or not values.strip():
+            raise UserError(f"--over takes key=values, such as material.yield_stress=20:200:5; got {quoted(text)}")
+        if key in axes:
+            raise UserError(f"--over names {quoted(key)[1:-1]} twice")
+        parts = values.strip().split(":")
+        axes[key] = _range(parts, text) if len(parts) > 1 else [_value(v) for v in names_in(values, "--over", "value")]
+    return axes
+
+
+def _range(parts: list[str], text: str) -> list[Any]:
+    """first:last:count, evenly, or first:last:count:log, by equal factors."""
+    log = parts[-1] == "log"
+    try:
+        first, last, count = parts[:-1] if log else parts
+        low, high, number = float(first), float(last), int(count)
+    except ValueError:
+        low, high, number = math.nan, math.nan, 0
+    if not (math.isfinite(low) and math.isfinite(high) and 2 <= number <= MOST_VALUES) or (log and min(low, high) <= 0):
+        raise UserError(
+            f"--over takes first:last:count, with 2 to {MOST_VALUES} values, evenly, or first:last:count:log, "
+            f"positive and by equal factors; got {quoted(text)}"
+        )
+    if log:
+        return [low * (high / low) ** (i / (number - 1)) for i in range(number)]
+    return [low + (high - low) * i / (number - 1) for i in range(number)]
+
+
+def _value(text: str) -> Any:
+    """A number where it is one, else the text, which may have a unit."""
+    from ..scenario.library import parse_override
+
+    return parse_override(f"value={text}")[1]

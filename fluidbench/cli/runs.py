@@ -13,6 +13,7 @@ from .options import (
     MeasuredFile,
     Pictures,
     ScenarioName,
+    Seed,
     Settings,
     Shorter,
     Solvers,
@@ -118,6 +119,7 @@ def validate(
     solvers: Solvers = None,
     levels: Annotated[str, typer.Option(help="spacings: rough, coarse, medium, fine (1.5, 1, 2/3, 1/2)")] = "coarse",
     quick: Annotated[bool, typer.Option("--quick", help="a few minutes: the cheap cases, every physics")] = False,
+    seed: Seed = 0,
     *,
     options: Any,
 ) -> None:
@@ -129,5 +131,5 @@ def validate(
 
     if cases:
         names_in(",".join(cases), "CASES", "case")
-    more = placed(options, "validate")
-    finish(study(cases, methods_in(solvers), levels=names_in(levels, "--levels", "level"), quick=quick, **more))
+    more, spacings = placed(options, "validate"), names_in(levels, "--levels", "level")
+    finish(study(cases, methods_in(solvers), levels=spacings, quick=quick, seed=seed, **more))

@@ -1,5 +1,6 @@
-"""stability, bench, ablate, select, table1 and table2: studies made of many runs."""
+"""sweep, stability, bench, ablate, select, table1 and table2: studies made of many runs."""
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -9,9 +10,12 @@ from .options import (
     MeasuredFile,
     Quick,
     ScenarioName,
+    Seed,
     Settings,
+    Shorter,
     Solvers,
     Spacing,
+    axes_of,
     budget_of,
     count_of,
     fraction,
@@ -22,6 +26,40 @@ from .options import (
     repeats_of,
     running,
 )
+
+
+@app.command()
+@running(wall_limit=900.0)
+def sweep(
+    scenario: ScenarioName,
+    over: Annotated[
+        list[str],
+        typer.Option(
+            help="a key and its values: material.yield_stress=20:200:5 (five of them, evenly), =1:1000:4:log, or "
+            "=20,50,100; again for a second key, and so on"
+        ),
+    ],
+    solvers: Solvers = None,
+    worlds: Annotated[
+        int | None,
+        typer.Option(min=1, help="points in one launch, where they can share one; default 64 on a GPU, 1 on a CPU"),
+    ] = None,
+    set_: Settings = None,
+    spacing: Spacing = None,
+    quick: Shorter = False,
+    *,
+    options: Any,
+) -> None:
+    """Run a scenario at every combination of values of some of its keys, through every method.
+
+    Points that differ in material, gravity, body force or seed alone share launches on a GPU. A second call reuses
+    what is finished.
+    """
+    from ..study.sweep import sweep as study
+
+    resolved = load_scenario(scenario, set_, spacing, quick)
+    axes = axes_of(over)
+    finish(study(resolved, axes, methods_in(solvers), worlds=worlds, **placed(options, f"sweep-{resolved.name}")))
 
 
 @app.command()
@@ -137,13 +175,22 @@ def select(
 
 
 @app.command()
-@running(wall_limit=1800.0)
+@running(wall_limit=3600.0)
 def table1(
     scenario: ScenarioName = "line_bead",
+    from_: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="run nothing: judge again what studies have kept in this folder, or in folders inside it",
+            show_default=False,
+        ),
+    ] = None,
     repeats: Annotated[int, typer.Option(min=2, help="runs of each method on the scenario, for the spread")] = 3,
     set_: Settings = None,
     spacing: Spacing = None,
     quick: Quick = False,
+    seed: Seed = 0,
     *,
     options: Any,
 ) -> None:
@@ -151,13 +198,17 @@ def table1(
 
     A second call reuses the runs that are finished.
     """
-    from ..paper.table1 import coarser
+    from ..paper.table1 import coarser, published
     from ..paper.table1 import table1 as study
+
+    if from_ is not None:
+        finish(published(from_, placed(options, "table1-published").get("out")))
+        return
 
     resolved = load_scenario(scenario, set_, spacing)
     if quick and spacing is None:
         resolved = load_scenario(scenario, set_, coarser(resolved))
-    finish(study(resolved, repeats=repeats_of(repeats), quick=quick, **placed(options, "table1")))
+    finish(study(resolved, repeats=repeats_of(repeats), quick=quick, seed=seed, **placed(options, "table1")))
 
 
 @app.command()

@@ -107,6 +107,10 @@ class Session(ABC):
     def frame(self) -> Frame:
         """The particles as they are now, see method/frame.py."""
 
+    def frames(self) -> list[Frame]:
+        """The particles of each scenario that it was started with."""
+        return [self.frame()]
+
     def glimpse(self) -> Frame:
         """As much of the frame as a picture needs: position, birth_time and phase."""
         frame = self.frame()
@@ -239,6 +243,16 @@ class Method(ABC):
     def memory(cls, scenario: Scenario, config: Any, particles: int) -> float:
         """What so many particles of a scenario will take [bytes]."""
         return particles * cls.typical_bytes
+
+    @classmethod
+    def apart(cls, scenarios: Sequence[Scenario]) -> str | None:
+        """Why it cannot run these scenarios in one session, in the same launches; None when it can."""
+        return "its sessions hold one scenario each" if len(scenarios) > 1 else None
+
+    @classmethod
+    def start_together(cls, scenarios: Sequence[Scenario], config: Any, target: Target) -> Session:
+        """One session for scenarios that are not `apart`."""
+        raise NotImplementedError(f"{cls.name}: its sessions hold one scenario each")
 
     @classmethod
     @abstractmethod

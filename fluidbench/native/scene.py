@@ -17,6 +17,7 @@ from .carriage import Carriage
 from .clock import Clock
 from .crew import Crew
 from .device import quiet_warp
+from .worlds import apart
 
 quiet_warp()
 SLIP, STICK, PERIODIC, FRICTION = 0, 1, 2, 3
@@ -101,7 +102,8 @@ class Scene:
         self.crew = Crew(self.device, threads)
         self.clock = Clock(self.scenario, self.crew)
         self.worlds = len(self.scenarios)
-        self._check_worlds()
+        if reason := apart(self.scenarios):
+            raise UserError(reason)
         self.spacing = self.scenario.spacing
         self.periodic = self.scenario.domain.walls.periodic()
         self.sound_speed = max(s.liquid_sound_speed for s in self.scenarios)
@@ -122,20 +124,6 @@ class Scene:
         self.outline = self.scenario.outline
         carries = self.scenario.collider is not None or self.outline is not None
         self.carriage = Carriage(self.crew, self.clock.hours, self.dt) if carries else None
-
-    def _check_worlds(self) -> None:
-        vary = {"material", "gravity", "body_force", "body_force_gradient", "name", "title", "seed"}
-        first = self.scenario.model_dump(exclude=vary)
-        for i, other in enumerate(self.scenarios[1:], 1):
-            changed = [key for key, value in other.model_dump(exclude=vary).items() if value != first[key]]
-            if changed:
-                raise UserError(
-                    f"worlds may differ in material, gravity, body_force and seed only; world {i} differs in "
-                    f"{', '.join(changed)}"
-                )
-            for section in ("cure", "expansion"):
-                if getattr(other.material, section) != getattr(self.scenario.material, section):
-                    raise UserError(f"worlds must share material.{section}; world {i} differs")
 
     def _phase(self, scenario: Scenario, material: Material) -> Phase:
         phase = Phase()

@@ -274,6 +274,9 @@ class Simulation(Session):
         found = self.pool.snapshot(world, density=self.solver.densities(), **more)
         return {"time": np.array(self.now), **found}
 
+    def frames(self) -> list[Frame]:
+        return [self.frame(world) for world in range(self.scene.worlds)]
+
     def glimpse(self) -> Frame:
         pool, n = self.pool, self.pool.counts[0]
         return {name: pool.fields[name][:n].numpy() for name in ("position", "birth_time", "phase")}

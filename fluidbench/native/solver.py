@@ -6,6 +6,7 @@ A solver advances a pool of particles by one substep. It knows nothing of nozzle
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..method.contract import Method, Session
@@ -25,10 +26,20 @@ class Solver(Method):
     backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
 
     @classmethod
+    def apart(cls, scenarios: Sequence[Scenario]) -> str | None:
+        from .worlds import apart
+
+        return apart(scenarios)
+
+    @classmethod
     def start(cls, scenario: Scenario, config: Any, target: Target) -> Session:
+        return cls.start_together([scenario], config, target)
+
+    @classmethod
+    def start_together(cls, scenarios: Sequence[Scenario], config: Any, target: Target) -> Session:
         from .simulation import Simulation
 
-        return Simulation(scenario, cls, target, config)
+        return Simulation(scenarios, cls, target, config)
 
     @abstractmethod
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from statistics import mean, stdev
+from statistics import geometric_mean, mean, stdev
 from typing import Any
 
 from ..method.verdict import Evidence as Weight
@@ -16,91 +16,107 @@ from ..scenario.numerics import configure
 from ..study.lengths import lengths_of
 from ..study.points import HELD, varied
 from ..study.trials import Trial
-from .cells import Cell, all_runs, figures, runs_of
-from .evidence import COST_CASES, METHODS, SHIPPED, Evidence
-from .frameworks import frameworks
+from . import definitions as words
+from .cells import Cell, all_runs, figures, paces, runs_of
+from .claims import claims
+from .definitions import CONFIRMED, COST_CASES, COST_PLACES, EFFECT, FEWEST, METHODS, OPEN, REFUTED
+from .elsewhere import EQUAL_ERROR, EQUAL_SPACING, ask_elsewhere, cost_place
+from .evidence import SHIPPED, Evidence
 from .verdicts import (
-    APART,
-    COLLAPSE,
-    CONFIRMED,
-    EFFECT,
-    FEWEST,
-    GOOD,
-    JUDGED,
-    OPEN,
-    POOR,
-    REFUTED,
     agreed,
     answers_of,
+    at_equal_cost,
     equal_error,
+    high,
+    in_real_time,
+    low,
     placed,
     ranked,
-    share_within,
-    told,
+    sensitivity,
+    share_is,
     winners,
+    within,
 )
 
-CLASSES = {
-    "deformables and viscous": ("viscous", "yield stress", "elastic", "viscoelastic"),
-    "liquids": ("liquid",),
-}
-
+DEFORMABLES, LIQUIDS = "deformables and viscous", "liquids"
+CLASSES = {DEFORMABLES: words.DEFORMABLE, LIQUIDS: words.LIQUIDS}
 VISCOSITIES, YIELDS = (1e-3, 1e3), (0.0, 1e4)  # ends of an axis: Pa s, Pa
-
-DEFORMATION = ("slump_cylinder", "self_weight_column", "cantilever_sag", "viscous_column_slip")
-
-COLLAPSING = ("collapse_threshold", "slump_slip")
 
 
 def cells(e: Evidence) -> list[Cell]:
     """Every cell of the paper's table, then its claims in words. Where nothing ran there is no verdict at all: what is
     shipped, and bounds, say nothing of code that does not run."""
-    found = [*paradigm(), *fidelity(e), *stability(e), *cost(e), *best_for(e), *limits(e), *claims(e), *frameworks(e)]
+    found = [*fidelity(e), *stability(e), *cost(e), *best_for(e), *limits(e), *claims(e)]
+    ask_elsewhere(found, e)
     if all(run.evidence is Weight.NOTHING for run in e.runs()):
-        found = [replace(cell, verdict=OPEN) for cell in found]
+        found = [replace(cell, verdict=OPEN, sensitivity="", elsewhere={}) for cell in found]
     return found
 
 
-def paradigm() -> list[Cell]:
-    words = {"mpm": "hybrid particle-grid", "sph": "particles, mesh-free", "pbd": "particles, constraints"}
-    return [Cell("paradigm", m, words[m], get_method(m).paradigm, "none", "definition", OPEN) for m in words]
-
-
-def _tally(trials: Sequence[Trial], method: str, physics: Sequence[str]) -> tuple[int, int, str]:
-    """(passed, judged, the same in words)."""
-    passed, judged = share_within(trials, method, physics)
-    own = answers_of(trials, [method], physics)
+def tally(own: Sequence[Trial]) -> str:
+    """So many of so many known answers, in words."""
+    passed, judged = within(own)
     old, lost = sum(t.note == SHIPPED for t in own), len(own) - judged
-    words = f"{passed} of {judged} known answers within tolerance" + f" ({old} {SHIPPED})" * (old > 0)
-    return passed, judged, words + f"; {lost} could not be run" * (lost > 0)
+    said = f"{passed} of {judged} known answers within tolerance" + f" ({old} {SHIPPED})" * (old > 0)
+    return said + f"; {lost} could not be run" * (lost > 0)
+
+
+def answered(
+    row: str, aspect: str, method: str, paper: str, rule: str, own: Sequence[Trial], right: Callable[[float], bool]
+) -> Cell:
+    """A cell on the share of a method's known answers that is within tolerance."""
+
+    def judge(trials: Sequence[Trial], factor: float) -> str:
+        return share_is(trials, right, factor)
+
+    brief = "{} of {} known answers".format(*within(own))
+    verdict = judge(own, 1.0)
+    return Cell(
+        row,
+        aspect,
+        method,
+        paper,
+        brief,
+        tally(own),
+        "validate",
+        rule,
+        verdict,
+        runs_of(own),
+        sensitivity(own, judge),
+    )
 
 
 def fidelity(e: Evidence) -> list[Cell]:
     paper = {
-        ("mpm", "deformables and viscous"): "high",
-        ("sph", "liquids"): "good",
-        ("pbd", "deformables and viscous"): "plausible, not accurate",
-        ("pbd", "liquids"): "plausible, not accurate",
+        ("mpm", DEFORMABLES): ("high", high),
+        ("sph", LIQUIDS): ("good", high),
+        ("pbd", DEFORMABLES): ("plausible, not accurate", low),
+        ("pbd", LIQUIDS): ("plausible, not accurate", low),
     }
-    cells = []
-    for kind, physics in CLASSES.items():
-        for method in METHODS:
-            passed, judged, measured = _tally(e.trials, method, physics)
-            word = paper.get((method, kind), "-")
-            verdict = OPEN
-            own = answers_of(e.trials, [method], physics)
-            if judged >= FEWEST and word != "-" and told(own):
-                share = passed / judged
-                low = word.startswith("plausible")
-                verdict = CONFIRMED if (share <= POOR if low else share >= GOOD) else REFUTED
-            runs = runs_of(own)
-            cells.append(Cell(f"fidelity, {kind}", method, word, measured, "validate", "fidelity", verdict, runs))
-    return cells
+    found = []
+    for (method, kind), (word, right) in paper.items():
+        own = answers_of(e.trials, [method], CLASSES[kind])
+        cell = answered("fidelity", kind, method, word, "fidelity", own, right)
+        shares = equal_cost(e.trials, method, CLASSES[kind])
+        cell.measured += f"; error over the best at equal cost: {shares}" if shares else ""
+        found.append(cell)
+    return found
+
+
+def equal_cost(trials: Sequence[Trial], method: str, physics: Sequence[str]) -> str:
+    """A method's error over the best one's at equal cost, on each case of a class that was run at several spacings."""
+    shown = []
+    for name in COST_CASES:
+        own = [t for t in trials if t.case.name == name and t.case.physics in physics]
+        errors = at_equal_cost(own)
+        if method in errors:
+            shown.append(f"{name} x {errors[method] / min(errors.values()):.2g} ({errors[method]:.2g})")
+    return ", ".join(shown)
 
 
 def stability(e: Evidence) -> list[Cell]:
     """Largest stable steps as measured at two spacings, over d/c; the default step in seconds beside them."""
-    words = {
+    paper = {
         "mpm": ("medium, medium dt", "middle"),
         "sph": ("low, smaller dt", "lowest"),
         "pbd": ("high, larger dt", "highest"),
@@ -111,79 +127,108 @@ def stability(e: Evidence) -> list[Cell]:
         for m, rows in e.limits.items()
     }
     places = ranked({m: v for m, v in measured.items() if len(v) >= FEWEST and len(v) == len(e.limits[m])})
-    cells = []
-    for m, (word, place) in words.items():
+    found = []
+    for m, (word, place) in paper.items():
         beyond = ">= " if any(not r.get("lump_limit_found", True) for r in e.limits.get(m, [])) else ""
-        steps = " and ".join(f"{v:.2f}" for v in measured.get(m, [])) or "not found"
-        text = f"largest stable dt {beyond}{steps} d/c"
+        steps = [f"{v:.2f}" for v in measured.get(m, [])]
+        text = f"largest stable dt {beyond}{' and '.join(steps) or 'not found'} d/c"
         text += f"; mean default dt {mean(dts[m]):.3g} s" if m in dts else ""
         verdict = placed(places[m], place) if len(places) == 3 else OPEN
-        cells.append(Cell("stability / dt", m, word, text, "stability, compare", "step", verdict, e.repeats[m]))
-    return cells
+        brief = f"stable to {beyond}{', '.join(steps) or '?'} d/c"
+        runs = e.repeats.get(m, [])
+        found.append(Cell("stability and dt", "", m, word, brief, text, "stability, compare", "step", verdict, runs))
+    return found
 
 
 def cost(e: Evidence) -> list[Cell]:
-    words = {"mpm": ("mid-high", "upper"), "sph": ("high", "highest"), "pbd": ("low", "lowest")}
-    walls = figures(e.repeats, "wall_per_simulated_s")
-    places = ranked(walls)
-    enough = len(places) == 3 and min(map(len, walls.values())) > 1
-    cells = []
-    for m, (word, place) in words.items():
+    walls = paces(e.repeats)
+    found = []
+    for m, (word, place) in COST_PLACES.items():
         if m in walls:
             spread = stdev(walls[m]) if len(walls[m]) > 1 else 0.0
-            measured = f"{mean(walls[m]):.3g} ± {spread:.1g} wall s / simulated s"
-            verdict = placed(places[m], place) if enough else OPEN
-            cells.append(Cell("cost at equal spacing", m, word, measured, "compare", "cost", verdict, e.repeats[m]))
-    for m, (word, place) in words.items():
+            brief = f"{mean(walls[m]):.3g} s a simulated s"
+            measured = f"{mean(walls[m]):.3g} ± {spread:.1g} s for a simulated second"
+            verdict = cost_place(e.repeats, m, place)
+            runs = e.repeats[m]
+            found.append(Cell("cost", EQUAL_SPACING, m, word, brief, measured, "compare", "cost", verdict, runs))
+    for m, (word, place) in COST_PLACES.items():
         verdict, shares = equal_error(e.trials, m, place)
-        measured = f"over the cheapest: {shares or 'no case that all three can run at several spacings'}"
+        measured = "over the cheapest: " + ", ".join(f"{n}: x {x:.2g}" for n, x in shares.items())
+        measured = measured if shares else "no case that all three can run at several spacings"
+        brief = f"x {geometric_mean(shares.values()):.2g} the cheapest" if shares else "not compared"
         runs = runs_of([t for t in e.trials if t.case.name in COST_CASES and t.method == m])
-        cells.append(Cell("cost at equal error", m, word, measured, "validate, levels", "equal error", verdict, runs))
-    return cells
+        cell = Cell("cost", EQUAL_ERROR, m, word, brief, measured, "validate, levels", "equal error", verdict, runs)
+        found.append(cell)
+    return found
 
 
 def best_for(e: Evidence) -> list[Cell]:
     paper = {
-        "mpm": ("realistic viscoelastoplastic fluids", ("yield stress", "viscoelastic", "elastic")),
-        "sph": ("realistic liquids", ("liquid",)),
+        "mpm": ("realistic viscoelastoplastic fluids", words.FLUIDS),
+        "sph": ("realistic liquids", words.LIQUIDS),
     }
-    cells = []
+    found = []
     for m, (word, physics) in paper.items():
-        wins = winners(e.trials, physics)
-        judged = sum(wins.values())
-        verdict = OPEN if judged < FEWEST else CONFIRMED if wins.get(m, 0) > judged / 2 else REFUTED
-        tally = ", ".join(f"{k} {n}" for k, n in sorted(wins.items(), key=lambda item: -item[1])) or "none"
-        runs = runs_of(answers_of(e.trials, METHODS, physics))
-        cells.append(
-            Cell("best for", m, word, f"cheapest within tolerance on: {tally}", "validate", "best", verdict, runs)
-        )
-    walls = figures(e.repeats, "wall_per_simulated_s")
-    paces = ", ".join(f"{k} {mean(v):.3g}" for k, v in walls.items())
-    verdict = placed(ranked(walls)["pbd"], "lowest") if len(walls) == 3 else OPEN
-    measured = f"at equal spacing, wall s / simulated s: {paces}"
-    return [*cells, Cell("best for", "pbd", "real-time previews", measured, "compare", "cost", verdict, all_runs(e))]
+
+        def judge(trials: Sequence[Trial], factor: float, m: str = m, physics: Sequence[str] = physics) -> str:
+            wins = winners(trials, physics, factor)
+            judged = sum(wins.values())
+            return OPEN if judged < FEWEST else CONFIRMED if wins.get(m, 0) > judged / 2 else REFUTED
+
+        own = answers_of(e.trials, METHODS, physics)
+        wins = winners(own, physics)
+        shown = ", ".join(f"{k} {n}" for k, n in sorted(wins.items(), key=lambda item: -item[1])) or "none"
+        brief = f"cheapest on {wins.get(m, 0)} of {sum(wins.values())}"
+        measured, verdict = f"cheapest within tolerance on: {shown}", judge(own, 1.0)
+        runs, hangs = runs_of(own), sensitivity(own, judge)
+        found.append(Cell("best for", "", m, word, brief, measured, "validate", "best", verdict, runs, hangs))
+    return [*found, previews(e)]
+
+
+def previews(e: Evidence) -> Cell:
+    """Real time: with how many particles, and how far off the bead's area is at the spacing next to that."""
+    every = {m: [*e.repeats.get(m, [])[:1], *e.second.get(m, []), *e.previews.get(m, [])] for m in METHODS}
+    most = {m: in_real_time(runs) for m, runs in every.items()}
+    shown = []
+    for m, n in most.items():
+        done = [r for r in every[m] if r.ok]
+        if math.isfinite(n) and done:
+            near = min(done, key=lambda r: abs(math.log(r.cost.peak_particles / n)))
+            off = abs(bead_area(near) / exact_area(e) - 1.0)
+            shown.append(f"{m} {n:.2g} (with {near.cost.peak_particles}, area off by {off:.1%})")
+    others = [most[m] for m in METHODS if m != "pbd"]
+    verdict = OPEN
+    if all(map(math.isfinite, most.values())):
+        verdict = CONFIRMED if most["pbd"] > EFFECT * max(others) else REFUTED
+    brief = "particles in real time: " + ", ".join(f"{m} {n:.2g}" for m, n in most.items() if math.isfinite(n))
+    measured = "particles in real time: " + (", ".join(shown) or "not found")
+    runs = [r for group in every.values() for r in group]
+    word = "real-time previews"
+    return Cell("best for", "", "pbd", word, brief, measured, "compare, four spacings", "real time", verdict, runs)
 
 
 def limits(e: Evidence) -> list[Cell]:
-    cells = []
+    found = []
     sizes = figures(e.repeats, "bytes_per_particle")
     if len(sizes) == 3:
         volume = e.scenario.spacing**3
         measured = ", ".join(f"{m} {v[0]:.0f} B ({v[0] / volume / 1e9:.3g} GB/m^3)" for m, v in sizes.items())
-        verdict = placed(ranked(sizes)["mpm"], "highest")
-        cells.append(Cell("limits: memory", "mpm", "memory", measured, "compare", "cost", verdict, all_runs(e)))
-    cells.append(grid_artifacts(e, "limits: grid artifacts", "grid artifacts"))
-    for name, key, ends, unit, more in (
-        ("viscosity, explicit", "material.viscosity", VISCOSITIES, "Pa s", {"numerics.sph.viscosity": "explicit"}),
-        ("viscosity, implicit", "material.viscosity", VISCOSITIES, "Pa s", {"numerics.sph.viscosity": "implicit"}),
-        ("yield stress", "material.yield_stress", YIELDS, "Pa", {}),
+        brief = f"{sizes['mpm'][0]:.0f} B a particle (sph {sizes['sph'][0]:.0f}, pbd {sizes['pbd'][0]:.0f})"
+        verdict, runs = placed(ranked(sizes)["mpm"], "highest"), all_runs(e)
+        found.append(Cell("limits", "memory", "mpm", "memory", brief, measured, "compare", "cost", verdict, runs))
+    found.append(grid_artifacts(e))
+    for aspect, paper, key, ends, unit, more in (
+        ("explicit viscosity", "high viscosity", "material.viscosity", VISCOSITIES, "Pa s", "explicit"),
+        ("implicit viscosity", "high viscosity", "material.viscosity", VISCOSITIES, "Pa s", "implicit"),
+        ("yield stress", "non-Newtonian", "material.yield_stress", YIELDS, "Pa", None),
     ):
-        first, last = (bound_dt(e.scenario, "sph", {key: value} | more) for value in ends)
-        verdict = CONFIRMED if first / last >= COLLAPSE else REFUTED
+        scheme = {} if more is None else {"numerics.sph.viscosity": more}
+        first, last = (bound_dt(e.scenario, "sph", {key: value} | scheme) for value in ends)
+        verdict = CONFIRMED if first / last >= words.COLLAPSE else REFUTED
         measured = f"dt {first:.3g} s at {ends[0]:g} {unit}, {last:.3g} s at {ends[1]:g}: {first / last:.3g}-fold"
-        word = "non-Newtonian" if name == "yield stress" else "high viscosity"
-        cells.append(Cell(f"limits: {name}", "sph", word, measured, "bounds", "collapse", verdict))
-    return [*cells, physical_accuracy(e)]
+        brief = f"step shrinks {first / last:.3g}-fold"
+        found.append(Cell("limits", aspect, "sph", paper, brief, measured, "bounds", "collapse", verdict))
+    return [*found, physical_accuracy(e)]
 
 
 def bound_dt(scenario: Scenario, method: str, settings: dict[str, Any]) -> float:
@@ -192,26 +237,41 @@ def bound_dt(scenario: Scenario, method: str, settings: dict[str, Any]) -> float
     return min(b.dt for b in solver.bounds(changed, configure(solver, changed), changed.reference_speed))
 
 
-def grid_artifacts(e: Evidence, row: str, word: str) -> Cell:
+def grid_artifacts(e: Evidence) -> Cell:
     """The bead's area at one particle a cell against eight and more, on each of two grids."""
-    exact = _exact_area(e)
-    off = {
-        g: [abs(lengths_of(r.record)["bead_area_m2"] / exact - 1.0) for r in runs if r.ok]
-        for g, runs in e.grids.items()
-    }
-    runs = [r for group in e.grids.values() for r in group]
-    measured = "; ".join(
-        f"{g**3:.2g} a cell: area off by {' and '.join(f'{a:.1%}' for a in v)}" for g, v in off.items() if v
+    exact, runs = exact_area(e), [r for group in e.grids.values() for r in group]
+    off = {g: [abs(bead_area(r) / exact - 1.0) for r in own if r.ok] for g, own in e.grids.items()}
+    shown = {g: [f"{a:.1%}" for a in v] + [str(r.verdict) for r in e.grids[g] if not r.ok] for g, v in off.items()}
+    measured = "; ".join(f"{g**3:.2g} a cell: area off by {' and '.join(v)}" for g, v in shown.items() if v)
+    brief = f"area off {', '.join(shown.get(1.0, []))} at 1 a cell, {', '.join(shown.get(2.0, []))} at 8"
+    blown = [r.evidence is Weight.INSTABILITY for r in e.grids.get(1.0, [])]
+    verdicts = [OPEN]
+    if all(len(off.get(g, [])) == 2 for g in (2.0, 3.0)):
+        if len(off.get(1.0, [])) == 2:
+            full = [max(EFFECT * max(off[2.0][i], off[3.0][i]), words.ARTIFACT) for i in range(2)]
+            verdicts = [CONFIRMED if off[1.0][i] > full[i] else REFUTED for i in range(2)]
+        elif len(blown) == 2 and all(blown):
+            verdicts = [CONFIRMED]
+    return Cell(
+        "limits",
+        "grid",
+        "mpm",
+        "grid artifacts, if too few particles occupy a cell",
+        brief,
+        measured,
+        "grid ratios, two grids",
+        "artifacts",
+        agreed(verdicts),
+        runs,
     )
-    if any(len(off.get(g, [])) < 2 for g in (1.0, 2.0, 3.0)):
-        return Cell(row, "mpm", word, f"not every run completed; {measured}", "grid ratios", "artifacts", OPEN, runs)
-    verdicts = [
-        CONFIRMED if off[1.0][i] > max(EFFECT * max(off[2.0][i], off[3.0][i]), 0.01) else REFUTED for i in range(2)
-    ]
-    return Cell(row, "mpm", word, measured, "grid ratios, two grids", "artifacts", agreed(verdicts), runs)
 
 
-def _exact_area(e: Evidence) -> float:
+def bead_area(run: Run) -> float:
+    """Of a finished bead [m^2]; NaN where none was laid."""
+    return lengths_of(run.record).get("bead_area_m2", math.nan)
+
+
+def exact_area(e: Evidence) -> float:
     """Q / V of the scenario [m^2]."""
     assert e.scenario.nozzle is not None and e.scenario.toolpath is not None
     return e.scenario.nozzle.rate / e.scenario.toolpath.speed
@@ -219,85 +279,18 @@ def _exact_area(e: Evidence) -> float:
 
 def physical_accuracy(e: Evidence) -> Cell:
     every = tuple(physics for group in CLASSES.values() for physics in group)
-    passed, judged, measured = _tally(e.trials, "pbd", every)
-    for name, sweep in (("iterations", e.iterations), ("spacings a step", e.advances)):
-        widths = [(v, _widths(runs)) for v, runs in sweep.items()]
-        shown = "; ".join(f"{v:g}: {' and '.join(f'{1e3 * w:.1f}' for w in seen)}" for v, seen in widths if seen)
-        measured += f"; bead width [mm] over {name}: {shown}"
     own = answers_of(e.trials, ["pbd"], every)
-    verdict = OPEN if judged < FEWEST or not told(own) else CONFIRMED if passed <= POOR * judged else REFUTED
-    runs = [r for sweep in (e.iterations, e.advances) for group in sweep.values() for r in group]
-    runs += runs_of(own)
-    word = "low physical accuracy"
-    return Cell("limits: accuracy", "pbd", word, measured, "validate, iterations, steps", "fidelity", verdict, runs)
+    cell = answered("limits", "accuracy", "pbd", "low physical accuracy", "fidelity", own, low)
+    for name, sweep in (("iterations", e.iterations), ("spacings a step", e.advances)):
+        widths = [(v, bead_widths(runs)) for v, runs in sweep.items()]
+        shown = "; ".join(f"{v:g}: {' and '.join(f'{1e3 * w:.1f}' for w in seen)}" for v, seen in widths if seen)
+        cell.measured += f"; bead width [mm] over {name}: {shown}"
+    cell.experiment = "validate, iterations, steps"
+    sweeps = [r for sweep in (e.iterations, e.advances) for group in sweep.values() for r in group]
+    cell.runs = [*sweeps, *cell.runs]
+    return cell
 
 
-def _widths(runs: Sequence[Run]) -> list[float]:
+def bead_widths(runs: Sequence[Run]) -> list[float]:
+    """Widths of the beads that were laid [m]."""
     return [width for r in runs if r.ok and (width := lengths_of(r.record).get("bead_width_m")) is not None]
-
-
-def claims(e: Evidence) -> list[Cell]:
-    """The sentences of the paper's text."""
-    cells = []
-    dts, walls = figures(e.repeats, "mean_dt_s"), figures(e.repeats, "wall_per_simulated_s")
-    if {"mpm", "sph"} <= set(dts) and len(walls) == 3:
-        ratio = mean(dts["mpm"]) / mean(dts["sph"])
-        cells.append(
-            Cell(
-                "claim",
-                "sph",
-                "needs prohibitively small steps in this setting",
-                f"dt is 1 / {ratio:.2f} of MPM's",
-                "compare",
-                "collapse",
-                CONFIRMED if ratio >= COLLAPSE else REFUTED,
-                all_runs(e),
-            )
-        )
-        costs = ", ".join(f"{m} {mean(v):.3g}" for m, v in walls.items())
-        cells.append(
-            Cell(
-                "claim",
-                "sph",
-                "would be the most expensive",
-                f"wall s / simulated s: {costs}",
-                "compare",
-                "cost",
-                placed(ranked(walls)["sph"], "highest"),
-                all_runs(e),
-            )
-        )
-    cells.append(bead_width(e))
-    cells.append(prediction(e, "cannot predict deformation under load", DEFORMATION))
-    cells.append(prediction(e, "cannot predict collapse", COLLAPSING))
-    return [*cells, grid_artifacts(e, "claim", "grid artifacts with too few particles a cell")]
-
-
-def prediction(e: Evidence, word: str, names: Sequence[str]) -> Cell:
-    """PBD's known answers on a set of cases."""
-    own = [t for t in e.trials if t.case.name in names and t.method == "pbd" and t.level in JUDGED and t.judged]
-    missed = [t for t in own if not t.error <= t.tolerance]
-    measured = ", ".join(
-        f"{t.case.name}: " + (f"error {t.error:.2g} of {t.tolerance:g}" if t.finding is not None else str(t.verdict))
-        for t in own
-    )
-    measured += f" ({SHIPPED})" if any(t.note == SHIPPED for t in own) else ""
-    verdict = OPEN if len(own) < FEWEST or not told(own) else CONFIRMED if len(missed) > len(own) / 2 else REFUTED
-    return Cell("claim", "pbd", word, measured or "not run", "validate", "prediction", verdict, runs_of(own))
-
-
-def bead_width(e: Evidence) -> Cell:
-    """PBD's bead against the mean of the others, at two spacings; open where those two disagree themselves."""
-    word, verdicts, lines = "cannot predict bead width", [], []
-    runs = [group[0] for group in e.repeats.values()] + list(e.second.values())
-    for level in ({m: group[0] for m, group in e.repeats.items()}, e.second):
-        widths = {m: _widths([run])[0] for m, run in level.items() if _widths([run])}
-        if len(widths) < 3 or any(math.isnan(w) for w in widths.values()):
-            verdicts.append(OPEN)
-            continue
-        others = mean([widths["mpm"], widths["sph"]])
-        off, apart = abs(widths["pbd"] / others - 1.0), abs(widths["mpm"] - widths["sph"]) / others
-        verdicts.append(OPEN if apart > APART else CONFIRMED if off > APART else REFUTED)
-        lines.append(", ".join(f"{m} {1e3 * w:.1f} mm" for m, w in widths.items()) + f": off by {off:.0%}")
-    measured = "; ".join(lines) or "a method did not lay a bead"
-    return Cell("claim", "pbd", word, measured, "compare, two spacings", "prediction", agreed(verdicts), runs)

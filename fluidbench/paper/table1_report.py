@@ -1,75 +1,172 @@
-"""What `table1` shows: the paper's table, cell by cell, with the rules and the runs behind the verdicts."""
+"""What `table1` shows: the paper's table, methods as columns, and under it the evidence of every cell."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..report.page import anchor
-from ..report.report import Report, Runs, machine_of, record_link
+from ..report.report import Detail, Report, machine_of
 from ..report.table import Link, Table
 from ..study.validate_report import work_precision
 from . import PAPER
 from .cells import Cell
+from .definitions import CONFIRMED, METHODS, OPEN, REFUTED, RULES
 from .evidence import Evidence
-from .frameworks import IN_BOTH
 from .judged import cells as judged
-from .verdicts import OPEN, RULES
+from .repeat import commands
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..study.trials import Trial
 
-def report(e: Evidence, root: Path) -> Report:
-    cells = judged(e)
-    counts = Counter(c.verdict for c in cells if not c.row.startswith(IN_BOTH))
-    findings = ["Verdicts: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()) + "."]
-    findings += [f"{c.row}, {c.method}: '{c.paper}': {c.verdict}. {c.measured}." for c in cells if c.verdict != OPEN]
-    by_case: dict[str, list] = {}
-    for t in e.trials:
-        by_case.setdefault(t.case.name, []).append(t)
-    several = [ts for ts in by_case.values() if len({t.spacing for t in ts}) > 1]
+DEPENDS = "depends on where"
+MARKS = {CONFIRMED: "✓", REFUTED: "✗", OPEN: "?", DEPENDS: "≠"}
+WORDS = {CONFIRMED: "confirmed", REFUTED: "refuted", OPEN: "open", DEPENDS: "depends"}  # where signs cannot be set
+NOTE = f"✓ {CONFIRMED}; ✗ {REFUTED}; ? open; ≠ the rule decides otherwise elsewhere, see the evidence"
+
+Studies = Mapping[str, Evidence]
+Place = list[tuple[str, Cell]]  # a cell in every study that has it
+
+
+def report(studies: Studies, root: Path) -> Report:
+    """`studies` by what sets them apart: one, or several that are put side by side."""
+    found = gathered(studies)
+    counts = Counter(verdict(place) for place in found)
+    findings = [f"Of {len(found)} statements " + ", ".join(f"{n} {WORDS[v]}" for v, n in counts.items()) + "."]
+    findings += [sentence(place) for place in found if verdict(place) in (OPEN, DEPENDS)]
+    scenario = next(iter(studies.values())).scenario.name
+    shown = matrix(found, len(studies) > 1)
     return Report(
         "table1",
-        f"fluidbench table1: {e.scenario.name}",
-        f'The table of "{PAPER}", with what was measured and a verdict that a rule computes.',
+        f"fluidbench table1: {scenario}",
+        f'The table of "{PAPER}", with what was measured and a verdict that a rule computes: {", ".join(studies)}.',
         findings,
-        [_cells(cells), _rules()],
-        _data(cells, root),
-        [work_precision(ts) for ts in several],
-        _runs(cells, root),
-        machine_of(r for c in cells for r in c.runs),
+        [shown],
+        _data(found),
+        [plot for e in studies.values() for plot in _work_precision(e.trials)],
+        details=[*(_detail(place, studies, root) for place in found), _rules()],
+        machine="; ".join(dict.fromkeys(machine_of(e.sweeps()) for e in studies.values())),
+        files={"table1.md": markdown(shown, findings[0], studies), "table1.tex": latex(shown)},
     )
 
 
-def _data(cells: list[Cell], root: Path) -> pd.DataFrame:
-    """One row a cell; its runs as folders."""
+def gathered(studies: Studies) -> list[Place]:
+    """The cells of all studies, those of one place together."""
+    found: dict[tuple[str, str, str], Place] = {}
+    for label, e in studies.items():
+        for cell in judged(e):
+            found.setdefault(cell.place, []).append((label, cell))
+    return list(found.values())
+
+
+def verdict(place: Place) -> str:
+    """What all studies and conditions say; open where one study is."""
+    if any(cell.verdict == OPEN for _, cell in place):
+        return OPEN
+    same = len({cell.verdict for _, cell in place}) == 1 and not any(cell.differs for _, cell in place)
+    return place[0][1].verdict if same else DEPENDS
+
+
+def sentence(place: Place) -> str:
+    """A cell as a finding."""
+    first = place[0][1]
+    told = [f"{f'{label}: ' if len(place) > 1 else ''}{c.verdict}. {c.measured}" for label, c in place]
+    differs = dict(chain.from_iterable(c.differs.items() for _, c in place))
+    return f"{first.name}: {'; '.join(told)}." + "".join(f" But {v}: {where}." for where, v in differs.items())
+
+
+def matrix(found: Sequence[Place], several: bool) -> Table:
+    """The paper's rows, methods as columns; in a cell each statement with its mark, and under it what was measured."""
+    table = Table("Table I, by measurement", ["", *METHODS], note=NOTE, text=True)
+    for row in dict.fromkeys(place[0][1].row for place in found):
+        columns = []
+        for method in METHODS:
+            own = [place for place in found if (place[0][1].row, place[0][1].method) == (row, method)]
+            columns.append([line for place in own for line in _statement(place, several)])
+        table.rows.append([row, *columns])
+    return table
+
+
+def _statement(place: Place, several: bool) -> list[str]:
+    cell = place[0][1]
+    head = Link(f"{MARKS[verdict(place)]} {cell.statement}", f"#{anchor(cell.name)}")
+    if not several:
+        return [head, f"  {cell.brief}"]
+    return [head, *(f"  {MARKS[c.verdict]} {label}: {c.brief}" for label, c in place)]
+
+
+def _detail(place: Place, studies: Studies, root: Path) -> Detail:
+    """What stands behind a cell: per study what was measured, what the verdict hangs on, and the runs."""
+    first = place[0][1]
+    made = Detail(f"{MARKS[verdict(place)]} {first.name}", anchor(first.name))
+    for label, cell in place:
+        made.lines.append(f"{label}: {cell.verdict}. {cell.measured}.")
+        if cell.sensitivity:
+            made.lines.append(f"What it hangs on: {cell.sensitivity}.")
+        made.lines += [f"Elsewhere: {where}: {v}." for where, v in cell.elsewhere.items()]
+        again = commands(studies[label])
+        for run in {r.folder: r for r in cell.runs}.values():
+            made.add_run(run, root, again.get(run.folder.name, ""))
+    made.lines.append(f"Rule: {RULES[first.rule]}. Experiment: {first.experiment}.")
+    return made
+
+
+def _rules() -> Detail:
+    return Detail("The rules", "rules", [f"{name}: {text}." for name, text in RULES.items()])
+
+
+def _work_precision(trials: Sequence[Trial]) -> list:
+    by_case: dict[str, list[Trial]] = {}
+    for t in trials:
+        by_case.setdefault(t.case.name, []).append(t)
+    return [work_precision(ts) for ts in by_case.values() if len({t.spacing for t in ts}) > 1]
+
+
+def _data(found: Sequence[Place]) -> pd.DataFrame:
+    """One row a cell and study; its runs as names of folders."""
     import pandas as pd
 
-    rows = [{k: v for k, v in vars(c).items() if k != "runs"} for c in cells]
-    folders = [" ".join(r.folder.relative_to(root).as_posix() for r in c.runs) for c in cells]
-    return pd.DataFrame(rows).assign(runs=folders)
+    rows = []
+    for label, cell in chain.from_iterable(found):
+        row = {k: v for k, v in vars(cell).items() if k not in ("runs", "elsewhere")}
+        elsewhere = "; ".join(f"{where}: {v}" for where, v in cell.elsewhere.items())
+        folders = " ".join(run.folder.name for run in cell.runs)
+        rows.append({"study": label, **row, "elsewhere": elsewhere, "runs": folders})
+    return pd.DataFrame(rows)
 
 
-def _runs(cells: list[Cell], root: Path) -> Runs:
-    """The records behind each cell; where one has no run of its own, nothing."""
-    return {_name(c): [record_link(r, root) for r in c.runs] for c in cells if c.runs}
+def markdown(table: Table, count: str, studies: Studies) -> str:
+    """The table as text for a page."""
+    import pandas as pd
+
+    rows = [[row[0], *("<br>".join(cell) for cell in row[1:])] for row in table.rows]
+    shown = pd.DataFrame(rows, columns=pd.Index(table.head)).map(lambda cell: cell.replace("|", "\\|"))
+    made = [f"- {label}: {machine_of(e.sweeps())}" for label, e in studies.items()]
+    return "\n".join(
+        [shown.to_markdown(index=False, disable_numparse=True), "", f"{count} {table.note}.", "", *made, ""]
+    )
 
 
-def _name(cell: Cell) -> str:
-    return f"{cell.row}, {cell.method}: {cell.paper}"
+def latex(table: Table) -> str:
+    """The table for a paper, with booktabs; its signs as words."""
+    lines = [r"\begin{tabular}{l" + len(METHODS) * "p{0.28\\linewidth}" + "}", r"\toprule"]
+    lines += [" & ".join(h.upper() for h in table.head) + r" \\", r"\midrule"]
+    for row in table.rows:
+        texts = [row[0], *(r" \newline ".join(_escaped(line) for line in cell) for cell in row[1:])]
+        lines.append(" & ".join(texts) + r" \\")
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])
 
 
-def _cells(cells: list[Cell]) -> Table:
-    table = Table("Table I, by measurement", ["row", "method", "paper", "measured", "experiment", "rule", "verdict"])
-    for c in cells:
-        experiment = Link(c.experiment, f"#{anchor(_name(c))}") if c.runs else c.experiment
-        table.rows.append([c.row, c.method, c.paper, c.measured, experiment, c.rule, c.verdict])
-    return table
-
-
-def _rules() -> Table:
-    table = Table("Rules", ["rule", "what it takes"])
-    table.rows.extend([name, text] for name, text in RULES.items())
-    return table
+def _escaped(text: str) -> str:
+    """A line with its mark, if it begins with one, as a word."""
+    text = text.strip()
+    for verdict, mark in MARKS.items():
+        text = f"[{WORDS[verdict]}] {text[2:]}" if text.startswith(f"{mark} ") else text
+    for sign, word in {**{c: f"\\{c}" for c in "%_&#$"}, ">=": "$\\geq$"}.items():
+        text = text.replace(sign, word)
+    return text

@@ -1,4 +1,4 @@
-"""The rules by which `table1` judges, in words (`RULES`) and as functions of finished runs.
+"""The rules by which `table1` judges, as functions of finished runs; their words and thresholds are in definitions.py.
 
 An order between methods needs a minimum effect, and between times also distance beyond the spread of the repeats.
 """
@@ -6,42 +6,27 @@ An order between methods needs a minimum effect, and between times also distance
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from statistics import mean, stdev
 
 import numpy as np
 
 from ..method.verdict import Evidence
+from ..runs.record import Run
 from ..study.trials import Trial
-from .evidence import COST_CASES, METHODS
-
-CONFIRMED, REFUTED, OPEN = "confirmed", "refuted", "not decidable"
-HOLDS, DIFFERS = "the same in both", "not the same in both"  # of a verdict, in the other backend
-EFFECT = 1.2  # two figures that differ by less than this factor count as equal
-GOOD, POOR = 0.75, 0.5  # share of known answers within tolerance that is high fidelity, or low
-FEWEST = 2  # known answers that a verdict on a class needs
-APART = 0.1  # relative difference of two lengths that counts as disagreement
-COLLAPSE = 10.0  # factor by which a step must shrink to count as collapsed
-JUDGED = ("coarse", "quick")  # levels at which a known answer counts
-
-RULES = {
-    "fidelity": f"high or good: at least {GOOD:.0%} of the known answers of the class within tolerance; not accurate: "
-    f"at most {POOR:.0%}; a class needs {FEWEST} of them",
-    "step": f"methods ordered by the largest dt over d/c that a thrown lump survives, at two spacings; a place needs a "
-    f"factor of {EFFECT:g} and two standard deviations",
-    "equal error": f"ordered by the time to reach the error that all three reach, a factor of {EFFECT:g} apart, on "
-    f"most of at least {FEWEST} cases",
-    "frameworks": "whether the rule of a verdict on cost says the same of the methods written in Warp and in Taichi",
-    "cost": f"methods ordered by the figure; a place needs a factor of {EFFECT:g}, and means more than two standard "
-    "deviations of the repeats apart",
-    "best": "the method that is cheapest, among those within tolerance, on most known answers of the class",
-    "collapse": f"the step shrinks at least {COLLAPSE:g}-fold from one end to the other",
-    "artifacts": f"at 1 particle a cell the bead's area is {EFFECT:g} times as far off as at 8 and 27, and over 1 %, "
-    "on both of two grids",
-    "prediction": f"most of at least {FEWEST} known answers missed; for the bead's width, over {APART:.0%} from the "
-    "mean of the other two methods (which must agree as well) at both of two spacings",
-    "definition": "a definition, not a claim",
-}
+from .definitions import (
+    CONFIRMED,
+    COST_CASES,
+    EFFECT,
+    FEWEST,
+    GOOD,
+    JUDGED,
+    METHODS,
+    OPEN,
+    POOR,
+    REFUTED,
+    TOLERANCES,
+)
 
 
 def answers_of(trials: Sequence[Trial], methods: Sequence[str], physics: Sequence[str]) -> list[Trial]:
@@ -55,11 +40,49 @@ def told(trials: Sequence[Trial]) -> bool:
     return all(t.evidence is not Evidence.NOTHING for t in trials)
 
 
-def share_within(trials: Sequence[Trial], method: str, physics: Sequence[str]) -> tuple[int, int]:
-    """(within tolerance, judged) of a method's known answers of these classes; a run that blew up is not within, one
-    that says nothing of the method is not judged."""
-    own = [t for t in answers_of(trials, [method], physics) if t.evidence is not Evidence.NOTHING]
-    return sum(t.error <= t.tolerance for t in own), len(own)
+def answers_to(trials: Sequence[Trial], names: Sequence[str], method: str) -> list[Trial]:
+    """A method's answers to these cases that count."""
+    return [t for t in trials if t.case.name in names and t.method == method and t.level in JUDGED and t.judged]
+
+
+def within(trials: Sequence[Trial], factor: float = 1.0) -> tuple[int, int]:
+    """(within a factor of their tolerance, judged): a run that blew up is not within, one that says nothing of the
+    method is not judged."""
+    own = [t for t in trials if t.evidence is not Evidence.NOTHING]
+    return sum(t.error <= factor * t.tolerance for t in own), len(own)
+
+
+def share_is(trials: Sequence[Trial], right: Callable[[float], bool], factor: float = 1.0) -> str:
+    """The verdict on a statement about the share of these known answers that is within tolerance."""
+    passed, judged = within(trials, factor)
+    if judged < FEWEST or not told(trials):
+        return OPEN
+    return CONFIRMED if right(passed / judged) else REFUTED
+
+
+def high(share: float) -> bool:
+    return share >= GOOD
+
+
+def low(share: float) -> bool:
+    return share <= POOR
+
+
+def sensitivity(trials: Sequence[Trial], judge: Callable[[Sequence[Trial], float], str]) -> str:
+    """What becomes of a verdict, `judge(known answers, factor on tolerances)`, without any one of the cases, and at
+    half and twice the tolerances."""
+    verdict = judge(trials, 1.0)
+    if verdict == OPEN:
+        return ""
+    without: dict[str, list[str]] = {}
+    for name in dict.fromkeys(t.case.name for t in trials):
+        other = judge([t for t in trials if t.case.name != name], 1.0)
+        if other != verdict:
+            without.setdefault(other, []).append(name)
+    lines = [f"{other} without {' or '.join(names)}" for other, names in without.items()]
+    lines = lines or ["the same without any one of its cases"]
+    lines += [f"{judge(trials, f)} at {f:g} times the tolerances" for f in TOLERANCES]
+    return "; ".join(lines)
 
 
 def ranked(figures: dict[str, list[float]]) -> dict[str, tuple[int, int]]:
@@ -92,50 +115,86 @@ def placed(place: tuple[int, int], word: str) -> str:
     return CONFIRMED if right else REFUTED
 
 
-def at_equal_error(trials: Sequence[Trial]) -> dict[str, float]:
-    """Wall time [s] of each method at the error that the worst of them reaches at its best: by a power law through its
-    spacings, or, where its error does not fall with cost, its cheapest run within that error. Nothing where a run says
-    nothing of its method."""
-    points = {}
+def seconds(trial: Trial) -> float:
+    """What a trial cost [s]: CPU time on a CPU, where other work may share the machine, wall time on a GPU."""
+    on_cpu = all(run.record.device == "cpu" for run in trial.runs.values())
+    return trial.cost["cpu_s" if on_cpu and "cpu_s" in trial.cost else "wall_s"]
+
+
+def _curves(trials: Sequence[Trial]) -> dict[str, np.ndarray]:
+    """log(error), log(cost) of each method at its spacings, two or more; none where a run says nothing of its
+    method."""
     if not told([t for t in trials if t.judged]):
         return {}
+    points = {}
     for m in dict.fromkeys(t.method for t in trials):
-        own = [(t.error, t.cost["wall_s"]) for t in trials if t.method == m and t.finding is not None and t.error > 0]
+        own = [(t.error, seconds(t)) for t in trials if t.method == m and t.finding is not None and t.error > 0]
         if len(own) >= 2:
             points[m] = np.log(np.array(own))
-    if len(points) < 2:
-        return {}
-    target = max(p[:, 0].min() for p in points.values())
-    return {m: math.exp(_cost_at(target, p)) for m, p in points.items()}
+    return points if len(points) >= 2 else {}
 
 
-def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, str]:
-    """(verdict on a method's place, its times over the cheapest) at the error that all three reach."""
+def at_equal_error(trials: Sequence[Trial]) -> dict[str, float]:
+    """Time [s] of each method at the error that the worst of them reaches at its best: by a power law through its
+    spacings, or, where its error does not fall with cost, its cheapest run within that error. Nothing where a run says
+    nothing of its method."""
+    curves = _curves(trials)
+    target = max((p[:, 0].min() for p in curves.values()), default=0.0)
+    return {m: math.exp(_falling(target, p[:, 0], p[:, 1])) for m, p in curves.items()}
+
+
+def at_equal_cost(trials: Sequence[Trial]) -> dict[str, float]:
+    """Error of each method at the cost of the cheapest one's finest run, by the same laws."""
+    curves = _curves(trials)
+    target = min((p[:, 1].max() for p in curves.values()), default=0.0)
+    return {m: math.exp(_falling(target, p[:, 1], p[:, 0])) for m, p in curves.items()}
+
+
+def _falling(target: float, x: np.ndarray, y: np.ndarray) -> float:
+    """y at x = target on the line through the points; where y does not fall with x, the least y up to there (or the
+    y of the least x, where all lie beyond)."""
+    fit = np.polyfit(x, y, 1)
+    if fit[0] < 0:
+        return float(np.polyval(fit, target))
+    there = x <= target + 1e-9
+    return float(y[there].min() if there.any() else y[np.argmin(x)])
+
+
+def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, dict[str, float]]:
+    """(verdict on a method's place, its time over the cheapest's by case) at the error that all three reach."""
     every = {name: at_equal_error([t for t in trials if t.case.name == name]) for name in COST_CASES}
     equal = {name: costs for name, costs in every.items() if len(costs) == 3}
-    shares = ", ".join(f"{n}: x {costs[method] / min(costs.values()):.2g}" for n, costs in equal.items())
+    shares = {name: costs[method] / min(costs.values()) for name, costs in equal.items()}
     tops = [placed(ranked({k: [v] for k, v in costs.items()})[method], place) for costs in equal.values()]
     if len(tops) < FEWEST:
         return OPEN, shares
     return CONFIRMED if tops.count(CONFIRMED) > len(tops) / 2 else REFUTED, shares
 
 
-def _cost_at(target: float, points: np.ndarray) -> float:
-    """log(cost) at log(error) = target from rows (log error, log cost)."""
-    fit = np.polyfit(points[:, 0], points[:, 1], 1)
-    if fit[0] < 0:
-        return float(np.polyval(fit, target))
-    return float(points[points[:, 0] <= target + 1e-9, 1].min())
-
-
-def winners(trials: Sequence[Trial], physics: Sequence[str]) -> dict[str, int]:
-    """On how many cases each method is the cheapest of those within tolerance."""
+def winners(trials: Sequence[Trial], physics: Sequence[str], factor: float = 1.0) -> dict[str, int]:
+    """On how many cases each method is the cheapest of those within a factor of the tolerance."""
     wins: dict[str, int] = {}
     rows = [t for t in answers_of(trials, METHODS, physics) if t.case.drive is None]
     for name in dict.fromkeys(t.case.name for t in rows):
         own = [t for t in rows if t.case.name == name]
-        good = [t for t in own if t.error <= t.tolerance]
+        good = [t for t in own if t.error <= factor * t.tolerance]
         if good and told(own):
-            first = min(good, key=lambda t: t.cost["wall_s"]).method
+            first = min(good, key=seconds).method
             wins[first] = wins.get(first, 0) + 1
     return wins
+
+
+def pace(run: Run) -> float:
+    """Seconds for a simulated one: CPU time on a CPU, where other work may share the machine, wall time on a GPU."""
+    return (run.cost.cpu_s if run.record.device == "cpu" else run.cost.wall_s) / run.cost.simulated_s
+
+
+def in_real_time(runs: Sequence[Run]) -> float:
+    """The most particles with which a simulated second takes no more than one, by a power law through these runs; NaN
+    where it does not rise with their number, or fewer than two have a result."""
+    points = [(run.cost.peak_particles, pace(run)) for run in runs if run.ok]
+    if len({n for n, _ in points}) < 2:
+        return math.nan
+    n, cost = np.log(np.array(points, dtype=float)).T
+    slope, at_one = np.polyfit(n, cost, 1)
+    return math.exp(-at_one / slope) if slope > 0 else math.nan

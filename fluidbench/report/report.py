@@ -32,6 +32,22 @@ class Image:
 
 
 @dataclass
+class Detail:
+    """A part of a page that unfolds: lines of text, and runs with what links to their records, where those are there,
+    and the commands that make them again."""
+
+    name: str
+    anchor: str
+    lines: list[str] = field(default_factory=list)
+    runs: list[tuple[str, str, str]] = field(default_factory=list)  # label, path or "", command or ""
+
+    def add_run(self, run: Run, root: Path, command: str = "") -> None:
+        """A run, with the command that makes it again."""
+        label, path = record_link(run, root)
+        self.runs.append((label, path if (root / path).exists() else "", command))
+
+
+@dataclass
 class Section:
     """A part of a page with a table and plots of its own."""
 
@@ -61,6 +77,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
     images: list[Image] = field(default_factory=list)
     sections: list[Section] = field(default_factory=list)
+    details: list[Detail] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)
     prefix: str = ""  # of the names of page and pictures, where the folder belongs to another study
 
@@ -75,7 +92,8 @@ class Report:
 
 def record_link(run: Run, root: Path, label: str = "") -> tuple[str, str]:
     """(label, path) of a run's record."""
-    return label or f"{run.name}: {run.verdict}", f"{run.folder.relative_to(root).as_posix()}/{RECORD}"
+    folder = run.folder.relative_to(root) if run.folder.is_relative_to(root) else run.folder
+    return label or f"{run.name}: {run.verdict}", f"{folder.as_posix()}/{RECORD}"
 
 
 def machine_of(runs: Iterable[Run]) -> str:

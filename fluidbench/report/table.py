@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import mean, stdev
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+
+PAGE = 100  # columns of a table to be read
 
 
 class Link(str):
@@ -24,12 +27,14 @@ class Link(str):
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of formatted cells under a head; the first column names the row."""
+    """Rows of formatted cells under a head; the first column names the row. A cell is a text, or several lines of it;
+    with `text` it is there to be read rather than compared, and never wider than a page."""
 
     title: str
     head: list[str]
-    rows: list[list[str]] = field(default_factory=list)
+    rows: list[Sequence[str | list[str]]] = field(default_factory=list)
     note: str = ""
+    text: bool = False
 
 
 def show(console: Console, table: Table) -> None:
@@ -38,11 +43,13 @@ def show(console: Console, table: Table) -> None:
     from rich.table import Table as RichTable
 
     wide = console.width >= 100  # on a narrow screen even names must fold
-    shown = RichTable(title=table.title, title_justify="left", title_style="bold")
+    style: Any = {"show_lines": True, "width": min(console.width, PAGE)} if table.text else {}
+    shown = RichTable(title=table.title, title_justify="left", title_style="bold", **style)
     for i, head in enumerate(table.head):
-        shown.add_column(escape(head), justify="left" if i == 0 else "right", overflow="fold", no_wrap=i == 0 and wide)
+        side = "left" if i == 0 or table.text else "right"
+        shown.add_column(escape(head), justify=side, overflow="fold", no_wrap=i == 0 and wide and not table.text)
     for row in table.rows:
-        shown.add_row(*map(escape, row))
+        shown.add_row(*(escape(cell if isinstance(cell, str) else "\n".join(cell)) for cell in row))
     console.print(shown)
     if table.note:
         console.print(table.note, markup=False, highlight=False)

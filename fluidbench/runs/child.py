@@ -33,7 +33,6 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
     """Run a job in this process; writes the series, the last snapshot and the record into the folder."""
     import pandas as pd
 
-    from ..measure.ledger import ledger, lengths
     from ..measure.rest import at_rest
 
     scenario = Scenario.model_validate(job.scenario)
@@ -49,8 +48,7 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
 
     def observe(session: Session, vital: Vital) -> None:
         frame = session.frame()
-        measured = ledger(frame, scenario) | lengths(frame, scenario)
-        rows.append({"time_s": session.now, "top_speed_m_s": vital.speed, **measured})
+        rows.append(row_of(frame, scenario, vital))
         if job.keep_frames:
             write_npz(folder / frame_name(len(rows) - 1), frame)
         report({"time": session.now, "until": scenario.duration, "speed": vital.speed})
@@ -91,6 +89,14 @@ def perform(job: Job, folder: Path, report: Callable[[dict[str, Any]], None]) ->
         checkpoints.discard()
     session.close()
     return record
+
+
+def row_of(frame: Frame, scenario: Scenario, vital: Vital) -> dict[str, float]:
+    """A row of a run's series: what is measured at an output."""
+    from ..measure.ledger import ledger, lengths
+
+    measured = ledger(frame, scenario) | lengths(frame, scenario)
+    return {"time_s": float(frame["time"]), "top_speed_m_s": vital.speed, **measured}
 
 
 def results(scenario: Scenario, frame: Frame, series: pd.DataFrame) -> dict[str, Any]:

@@ -83,3 +83,19 @@ def test_ablate_ends_with_a_confirmed_mix(tmp_path):
 def test_select_recommends_with_evidence(tmp_path):
     done = fluidbench("select", "line_bead", "--solvers", "mpm", "--tolerance", "10%", "--out", str(tmp_path))
     assert done.returncode == 0 and "Recommended: mpm" in done.stdout and "How sure" in done.stdout
+
+
+def test_worlds_of_a_sweep_come_to_what_single_runs_do(tmp_path):
+    import pandas as pd
+
+    grid = ["--over", "material.yield_stress=20,200", "--spacing", "4mm", "--solvers", "mpm"]
+    tables = {}
+    for name, more in (("together", ["--worlds", "2"]), ("alone", [])):
+        done = fluidbench("sweep", "line_bead", *grid, *more, "--out", str(tmp_path / name))
+        assert done.returncode == 0, done.stderr
+        assert "2 points, 2 runs: 2 completed." in done.stdout
+        tables[name] = pd.read_parquet(tmp_path / name / "sweep.parquet")
+    for key in ("bead_width_m", "bead_height_m"):
+        assert tables["together"][key].tolist() == tables["alone"][key].tolist()
+    again = fluidbench("sweep", "line_bead", *grid, "--out", str(tmp_path / "alone"))
+    assert again.returncode == 0 and (tmp_path / "alone" / "report.html").exists()

@@ -9,7 +9,8 @@ from fluidbench.method.frame import FREE
 from fluidbench.method.target import Target
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
-from fluidbench.paper.evidence import METHODS, Evidence
+from fluidbench.paper.definitions import METHODS
+from fluidbench.paper.evidence import Evidence
 from fluidbench.runs.execute import Hooks
 from fluidbench.runs.record import Cost, Record, Run
 from fluidbench.runs.store import Store
@@ -133,7 +134,14 @@ def known(method, good, bad, physics="liquid", **more):
 def repeated(counts=2, **paces):
     return {
         m: [
-            finished(m, repeat=r, wall_per_simulated_s=p, mean_dt_s=1e-3 / p, bytes_per_particle=100 * p)
+            finished(
+                m,
+                repeat=r,
+                cpu_s=p,
+                wall_s=p,
+                mean_dt_s=1e-3 / p,
+                bytes_per_particle=100 * p,
+            )
             for r in range(counts)
         ]
         for m, p in paces.items()

@@ -8,11 +8,13 @@ import pytest
 from fluidbench.method.verdict import Evidence as Weight
 from fluidbench.method.verdict import Verdict, evidence_of, lacking
 from fluidbench.paper.cells import figures
-from fluidbench.paper.evidence import METHODS, Evidence
-from fluidbench.paper.judged import cells, claims, fidelity
+from fluidbench.paper.claims import claims
+from fluidbench.paper.definitions import CONFIRMED, METHODS, OPEN, REFUTED
+from fluidbench.paper.evidence import Evidence
+from fluidbench.paper.judged import cells, fidelity
 from fluidbench.paper.rows import Row
 from fluidbench.paper.rows import claims as claims2
-from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED, at_equal_error, share_within, told, winners
+from fluidbench.paper.verdicts import answers_of, at_equal_error, told, winners, within
 from fluidbench.runs import execute as execution
 from fluidbench.runs import job as job_module
 from fluidbench.runs import provenance
@@ -56,7 +58,7 @@ def test_what_says_nothing_is_not_judged_and_what_blew_up_is_not_within():
     liquid = ["elliptic_drop", "dam_break", "hydrostatic_column"]
     for verdict, expected in (("error", (2, 2)), ("timeout", (2, 2)), ("refused", (2, 2)), ("diverged", (2, 3))):
         trials = [trial(liquid[0], "sph"), trial(liquid[1], "sph"), trial(liquid[2], "sph", verdict)]
-        assert share_within(trials, "sph", ["liquid"]) == expected
+        assert within(answers_of(trials, ["sph"], ["liquid"])) == expected
         assert told(trials) == (verdict == "diverged")
 
 
@@ -70,7 +72,7 @@ def test_no_verdict_rests_on_runs_that_crashed():
         m: [{"axis": "spacing", "value": 1.0, "method": m, "verdict": "error", "reason": "it died"}] * 2
         for m in METHODS
     }
-    e = Evidence(load("line_bead"), trials, broken, {m: broken[m][0] for m in METHODS}, limits=points, other=broken)
+    e = Evidence(load("line_bead"), trials, broken, {m: broken[m][:1] for m in METHODS}, limits=points, other=broken)
     assert {cell.verdict for cell in cells(e)} == {OPEN}
     missing = e.missing()
     assert any("ImportError" in line for line in missing) and any("it died" in line for line in missing)
@@ -82,8 +84,8 @@ def test_one_crash_among_known_answers_leaves_their_verdicts_open():
     runs = {m: [finished(m, repeat=r) for r in range(2)] for m in METHODS}
 
     def verdict(trials):
-        e = Evidence(load("line_bead"), trials, runs, {m: runs[m][0] for m in METHODS})
-        (cell,) = [c for c in fidelity(e) if c.method == "sph" and c.row.endswith("liquids")]
+        e = Evidence(load("line_bead"), trials, runs, {m: runs[m][:1] for m in METHODS})
+        (cell,) = [c for c in fidelity(e) if c.method == "sph" and c.aspect == "liquids"]
         return cell.verdict
 
     assert verdict(good) == CONFIRMED
@@ -97,7 +99,7 @@ def test_a_prediction_needs_answers_not_crashes():
 
     def verdict(state):
         e = Evidence(
-            load("line_bead"), [trial(n, "pbd", state, 9.9) for n in names], runs, {m: runs[m][0] for m in METHODS}
+            load("line_bead"), [trial(n, "pbd", state, 9.9) for n in names], runs, {m: runs[m][:1] for m in METHODS}
         )
         (cell,) = [c for c in claims(e) if c.paper == "cannot predict deformation under load"]
         return cell.verdict

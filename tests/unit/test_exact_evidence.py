@@ -9,7 +9,8 @@ import pytest
 from fluidbench.method.target import Target
 from fluidbench.paper import evidence as module
 from fluidbench.paper.cells import all_runs, figures, runs_of
-from fluidbench.paper.evidence import COST_CASES, DEAR, METHODS, SHIPPED, Evidence, gather, levels_of, shipped
+from fluidbench.paper.definitions import COST_CASES, METHODS, STRANDS
+from fluidbench.paper.evidence import DEAR, GROUPS, SHIPPED, Evidence, gather, levels_of, methods_of, shipped
 from fluidbench.runs.experiment import Experiment
 from fluidbench.runs.job import Job
 from fluidbench.runs.record import Run
@@ -68,16 +69,27 @@ def test_the_scenario_runs_through_every_method_and_backend(gathered):
         ]
         assert [r.wanted.target.backend for r in found.other[m]] == ["taichi", "taichi"]
         assert [r.wanted.repeat for r in found.other[m]] == [0, 1]
-        assert found.second[m].record.spacing_m == pytest.approx(2e-3)
-        assert found.second[m].method == m
-    (made,) = calls  # at once, so that what is wanted twice is run once
-    assert len(made) == 42 and {job.wall_limit for job in made} == {77.0}
+        (second,) = found.second[m]
+        assert second.record.spacing_m == pytest.approx(2e-3) and second.method == m
+        assert [r.record.spacing_m for r in found.previews[m]] == pytest.approx([3e-3, 4e-3])
+    timed, swept = calls
+    made = [*timed, *swept]
+    assert (len(timed), len(swept)) == (36, 24) and {job.wall_limit for job in made} == {77.0}
     assert all(
         job.target.backend == "warp"
         for job in made
         if job.method and job not in [r.wanted for runs in found.other.values() for r in runs]
     )
-    assert len(found.runs()) == 42
+    assert len(found.runs()) == 60
+
+
+def test_a_viscous_liquid_runs_by_both_schemes(gathered):
+    found, *_ = gathered
+    for scheme, runs in (("explicit", found.explicit), ("implicit", found.implicit)):
+        for m in ("mpm", "sph"):
+            assert [numerics(r, m, "viscosity") for r in runs[m]] == [scheme] * 2
+        assert [r.wanted.scenario["name"] for r in runs["pbd"]] == ["honey_line"] * 2
+        assert [r.wanted.repeat for r in runs["pbd"]] == [0, 1]
 
 
 def test_sweeps_have_two_resolutions(gathered):
@@ -106,25 +118,27 @@ def test_limits_are_measured_at_two_spacings(gathered):
 def test_times_are_measured_one_at_a_time_and_limits_are_not():
     place = Place()
     gather(BEAD, [], 3, False, place)
-    assert place.together == [False, True]
+    assert place.together == [False, True, True]
 
 
 def test_one_backend_alone_is_no_pair(monkeypatch):
     monkeypatch.setattr(Target, "other", property(lambda _: None))
     alone = gather(BEAD, [], 2, True, Place())
-    assert alone.other == {} and len(alone.runs()) == 33
-    assert len(gather(BEAD, [], 5, True, Place()).runs()) == 42
+    assert alone.other == {} and len(alone.runs()) == 51
+    assert len(gather(BEAD, [], 5, True, Place()).runs()) == 60
 
 
 def test_levels_and_cases_of_a_quick_study():
     every = cases()
-    assert [c.name for c in module.chosen_cases(False)] == list(every)
-    assert {c.name for c in module.chosen_cases(True)} == set(every) - set(DEAR)
+    full, quick = ({c.name for c in module.chosen_cases(q)} for q in (False, True))
+    assert quick == full - set(DEAR) and {STRANDS, *COST_CASES, "cantilever_sag"} <= full
+    assert not full & {"free_fall", "strand_concrete", "wall_collapse", "constitutive_driver"}  # no rule asks for them
+    assert methods_of(every[STRANDS]) == ("pbd",) and methods_of(every["dam_break"]) == METHODS
     assert levels_of(every["dam_break"], False) == ("rough", "coarse", "medium")
     assert levels_of(every["dam_break"], True) == ("rough", "coarse") and levels_of(every["free_fall"], False) == (
         "coarse",
     )
-    assert set(COST_CASES) | set(DEAR) <= set(every)
+    assert set(COST_CASES) | set(DEAR) <= full
 
 
 def test_shipped_answers_are_those_of_the_dear_cases():
@@ -177,19 +191,11 @@ def test_what_is_missing_is_every_run_trial_and_point_that_says_nothing():
         "o, sph, d = 10 mm: timeout: ",
         "stability, spacing = 0.5, sph: error: r",
     ]
-    bad = [finished(f"m{i}", "error") for i in range(6)]
-    full = Evidence(
-        BEAD,
-        [],
-        {"mpm": [bad[0]]},
-        {"mpm": bad[1]},
-        {1.0: [bad[2]]},
-        {1: [bad[3]]},
-        {0.1: [bad[4]]},
-        {},
-        {"mpm": [bad[5]]},
-    )
-    assert {id(r) for r in full.runs()} == {id(r) for r in bad} and len(full.missing()) == 6
+    bad = [finished(f"m{i}", "error") for i in range(len(GROUPS))]
+    full = Evidence(BEAD, [], {})
+    for name, run in zip(GROUPS, bad, strict=True):
+        full.take(name, {"mpm": [run]})
+    assert [id(r) for r in full.runs()] == [id(r) for r in bad] and len(full.missing()) == len(bad)
 
 
 def test_figures_need_every_repeat():

@@ -1,6 +1,7 @@
 """Cells of the tables as they are formatted, and of the page of the printed tower."""
 
 import math
+from collections import Counter
 from dataclasses import replace
 from io import StringIO
 
@@ -10,9 +11,11 @@ from rich.console import Console
 from fluidbench.measure.collapse import Collapse, Mode
 from fluidbench.measure.reference import Answer
 from fluidbench.measure.tower import Criterion, Print
+from fluidbench.paper import definitions, judged
 from fluidbench.paper import table1_report as table1_page
 from fluidbench.paper import table2_report as table2_page
 from fluidbench.paper.rows import Row
+from fluidbench.report.page import anchor
 from fluidbench.report.table import Table, label, number, show, spread
 from fluidbench.study import stability_report as stability_page
 from fluidbench.study.compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
@@ -237,16 +240,41 @@ def test_the_page_of_the_table_counts_its_verdicts(tmp_path):
     e = evidence(rows, repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0))
     for run in e.runs():
         object.__setattr__(run, "folder", tmp_path / "runs" / "x")
-    made = table1_page.report(e, tmp_path)
-    cells = [row for row in made.tables[0].rows if not row[0].startswith("in both")]
-    counts = dict(
-        part.split(" ", 1)[::-1] for part in made.findings[0].removeprefix("Verdicts: ").rstrip(".").split(", ")
-    )
-    for verdict in ("confirmed", "refuted", "not decidable"):
-        assert int(counts[verdict]) == sum(row[-1] == verdict for row in cells)
-    assert len(made.findings) == 1 + sum(row[-1] != "not decidable" for row in made.tables[0].rows)
-    assert len(made.data) == len(made.tables[0].rows) and len(made.plots) == 1
-    assert made.tables[1].rows[0][0] == "fidelity"
+    made = table1_page.report({"here": e}, tmp_path)
+    found = judged.cells(e)
+    counts = Counter(table1_page.verdict([("here", c)]) for c in found)
+    words = ", ".join(f"{n} {table1_page.WORDS[v]}" for v, n in counts.items())
+    assert made.findings[0] == f"Of {len(found)} statements {words}."
+    assert len(made.findings) == 1 + counts[definitions.OPEN] + counts[table1_page.DEPENDS]
+    assert len(made.data) == len(found) and len(made.plots) == 1
+    (table,) = made.tables
+    assert table.head == ["", "mpm", "sph", "pbd"] and table.rows[0][0] == "fidelity"
+    marks = [line[0] for row in table.rows for cell in row[1:] for line in cell if line[1:2] == " " and line[0] != " "]
+    assert Counter(marks) == {table1_page.MARKS[v]: n for v, n in counts.items()}
+    assert [d.anchor for d in made.details[:-1]] == [line.href[1:] for line in _heads(table, found)]
+
+
+def _heads(table, found):
+    """The heads of statements, in the order of the cells."""
+    heads = {line.href: line for row in table.rows for cell in row[1:] for line in cell if hasattr(line, "href")}
+    return [heads[f"#{anchor(c.name)}"] for c in found]
+
+
+def test_studies_that_disagree_are_said_to(tmp_path):
+    studies = {
+        "CPU": evidence(repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)),
+        "GPU": evidence(repeats=repeated(mpm=2.0, sph=8.0, pbd=4.0)),
+    }
+    places = {place[0][1].place: place for place in table1_page.gathered(studies)}
+    low, high = places["cost", "at equal spacing", "pbd"], places["cost", "at equal spacing", "sph"]
+    assert [c.verdict for _, c in low] == ["confirmed", "refuted"]
+    assert table1_page.verdict(low) == table1_page.DEPENDS and table1_page.verdict(high) == "confirmed"
+    made = table1_page.report(studies, tmp_path)
+    assert sorted(set(made.data.study)) == ["CPU", "GPU"]
+    assert any("CPU: confirmed" in line and "GPU: refuted" in line for line in made.findings)
+    text, tex = made.files["table1.md"], made.files["table1.tex"]
+    assert "≠ low, at equal spacing<br>  ✓ CPU: 2 s a simulated s<br>  ✗ GPU: 4 s a simulated s" in text
+    assert r"[depends] low, at equal spacing \newline [confirmed] CPU: 2 s" in tex and "✓" not in tex
 
 
 def test_the_page_of_stability_draws_limits_and_marks_what_has_none():

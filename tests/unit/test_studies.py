@@ -10,21 +10,8 @@ from fluidbench.errors import UserError
 from fluidbench.method.suitability import approximations, refusal
 from fluidbench.method.target import HERE
 from fluidbench.method.timestep import lost_speed
-from fluidbench.paper.evidence import Evidence
-from fluidbench.paper.frameworks import frameworks
-from fluidbench.paper.verdicts import (
-    CONFIRMED,
-    DIFFERS,
-    HOLDS,
-    OPEN,
-    REFUTED,
-    agreed,
-    at_equal_error,
-    placed,
-    ranked,
-    share_within,
-    winners,
-)
+from fluidbench.paper.definitions import CONFIRMED, OPEN, REFUTED
+from fluidbench.paper.verdicts import agreed, answers_of, at_equal_error, placed, ranked, winners, within
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import load
 from fluidbench.scenario.numerics import configure
@@ -164,7 +151,8 @@ def test_a_step_too_small_for_single_precision_is_refused():
 
 def test_shares_and_winners_leave_out_what_missed():
     trials = [trial("elliptic_drop", "mpm", 0.001, 2.0), trial("elliptic_drop", "sph", 0.9, 1.0)]
-    assert share_within(trials, "mpm", ["liquid"]) == (1, 1) and share_within(trials, "sph", ["liquid"]) == (0, 1)
+    shares = {m: within(answers_of(trials, [m], ["liquid"])) for m in ("mpm", "sph")}
+    assert shares == {"mpm": (1, 1), "sph": (0, 1)}
     assert winners(trials, ["liquid"]) == {"mpm": 1}
 
 
@@ -198,24 +186,3 @@ def test_options_are_read_or_refused():
             budget_of(wrong)
     with pytest.raises(UserError, match="did you mean 'viscosity'"):
         choose(["viscocity"], ["mpm"])
-
-
-def run_at(method, backend, pace, repeat):
-    return finished(
-        method, backend=backend, repeat=repeat, wall_per_simulated_s=pace * (1 + 0.001 * repeat), wall_s=pace
-    )
-
-
-def paces(backend, **by_method):
-    return {m: [run_at(m, backend, pace, r) for r in range(2)] for m, pace in by_method.items()}
-
-
-def test_a_verdict_on_cost_is_the_same_in_both_backends_or_said_to_differ():
-    here = paces("warp", mpm=1.0, sph=10.0, pbd=4.0)
-    held = frameworks(Evidence(load("line_bead"), [], here, other=paces("taichi", mpm=2.0, sph=12.0, pbd=5.0)))
-    assert {c.verdict for c in held if c.row.endswith("cost at equal spacing")} == {HOLDS}
-    turned = frameworks(Evidence(load("line_bead"), [], here, other=paces("taichi", mpm=2.0, sph=3.0, pbd=9.0)))
-    verdicts = {c.method: c.verdict for c in turned if c.row.endswith("cost at equal spacing")}
-    assert verdicts == {"mpm": HOLDS, "sph": DIFFERS, "pbd": HOLDS}
-    alone = frameworks(Evidence(load("line_bead"), [], here))
-    assert {c.verdict for c in alone} == {OPEN}

@@ -1,4 +1,4 @@
-"""Verdicts on cost in both frameworks, and the lengths and rows of a comparison."""
+"""Verdicts on cost under other conditions, and the lengths and rows of a comparison."""
 
 import math
 
@@ -7,9 +7,10 @@ import pytest
 from fluidbench.errors import UserError
 from fluidbench.measure.reference import Answer
 from fluidbench.method.target import Target
-from fluidbench.paper.evidence import METHODS
-from fluidbench.paper.frameworks import frameworks
-from fluidbench.paper.verdicts import DIFFERS, HOLDS, OPEN
+from fluidbench.paper.claims import claims
+from fluidbench.paper.definitions import CONFIRMED, METHODS, OPEN, REFUTED
+from fluidbench.paper.elsewhere import EQUAL_ERROR, EQUAL_SPACING, MOST_EXPENSIVE, SMALL_STEPS, ask_elsewhere
+from fluidbench.paper.judged import cost
 from fluidbench.study import compare_report
 from fluidbench.study.compare import jobs
 from fluidbench.study.lengths import lengths_of
@@ -19,37 +20,33 @@ from .made import BEAD, case, change, evidence, finished, repeated, trial
 TAICHI = Target(backend="taichi")
 
 
-def both(here, there, trials=(), others=()):
+def asked(here, there, trials=(), others=()):
+    """Cells by place, on evidence in both backends."""
     made = {m: [change(r, backend="taichi") for r in rs] for m, rs in there.items()}
-    return frameworks(evidence(trials, repeats=here, other=made, other_trials=list(others)))
+    e = evidence(trials, repeats=here, other=made, other_trials=list(others))
+    cells = [*cost(e), *claims(e)]
+    ask_elsewhere(cells, e)
+    return {c.place: c for c in cells}
+
+
+SPACING = [("cost", EQUAL_SPACING, m) for m in METHODS]
+EXPENSIVE = ("claims", MOST_EXPENSIVE, "sph")
 
 
 def test_every_place_of_cost_is_held_against_the_other_backend():
     here = repeated(mpm=2.0, sph=9.0, pbd=1.0)
-    cells = both(here, repeated(mpm=2.0, sph=2.1, pbd=1.0))
-    assert [(c.row.removeprefix("in both frameworks: "), c.method, c.paper, c.verdict) for c in cells] == [
-        ("cost at equal spacing", "mpm", "mid-high", HOLDS),
-        ("cost at equal spacing", "sph", "high", DIFFERS),
-        ("cost at equal spacing", "pbd", "low", HOLDS),
-        ("claim", "sph", "would be the most expensive", DIFFERS),
-        ("best for", "pbd", "real-time previews", HOLDS),
-        ("cost at equal error", "mpm", "mid-high", OPEN),
-        ("cost at equal error", "sph", "high", OPEN),
-        ("cost at equal error", "pbd", "low", OPEN),
-        ("best for", "mpm", "realistic viscoelastoplastic fluids", OPEN),
-        ("best for", "sph", "realistic liquids", OPEN),
-    ]
-    assert cells[1].measured == (
-        "confirmed and refuted; here and in the other backend, wall s / simulated s: mpm 2, sph 9, pbd 1; "
-        "mpm 2, sph 2.1, pbd 1"
-    )
-    assert {len(c.runs) for c in cells[:5]} == {12} and {c.rule for c in cells} == {"frameworks"}
-    turned = both(here, repeated(mpm=1.0, sph=9.0, pbd=2.0))
-    assert [c.verdict for c in turned[:5]] == [DIFFERS, HOLDS, DIFFERS, HOLDS, DIFFERS]
+    cells = asked(here, repeated(mpm=2.0, sph=2.1, pbd=1.0))
+    assert [cells[place].elsewhere["the other backend"] for place in SPACING] == [CONFIRMED, REFUTED, CONFIRMED]
+    assert [cells[place].differs for place in SPACING] == [{}, {"the other backend": REFUTED}, {}]
+    assert cells[EXPENSIVE].differs == {"the other backend": REFUTED}
+    turned = asked(here, repeated(mpm=1.0, sph=9.0, pbd=2.0))
+    assert [bool(turned[place].differs) for place in (*SPACING, EXPENSIVE)] == [True, False, True, False]
     short = repeated(mpm=2.0, sph=9.0) | repeated(1, pbd=1.0)
-    for other in (short, repeated(1, mpm=2.0, sph=9.0, pbd=1.0), repeated(mpm=2.0, sph=9.0), {}):
-        assert {c.verdict for c in both(here, other)} == {OPEN}
-        assert {c.verdict for c in both(other or {"mpm": []}, here)} == {OPEN}
+    for other in (short, repeated(1, mpm=2.0, sph=9.0, pbd=1.0), repeated(mpm=2.0, sph=9.0)):
+        cells = asked(here, other)
+        assert {cells[place].elsewhere["the other backend"] for place in SPACING} == {OPEN}
+        assert not any(cells[place].differs for place in SPACING)  # what is open there says nothing against it
+    assert not any(cell.elsewhere for cell in asked(here, {}).values())
 
 
 def test_cost_at_equal_error_is_held_against_the_other_backend():
@@ -62,15 +59,27 @@ def test_cost_at_equal_error_is_held_against_the_other_backend():
         ]
 
     here = repeated(mpm=2.0, sph=9.0, pbd=1.0)
-    cells = both(here, here, answers(2.0, 9.0, 1.0), answers(2.0, 9.0, 1.0))[5:8]
-    assert [c.verdict for c in cells] == [HOLDS] * 3 and {len(c.runs) for c in cells} == {4}
-    assert cells[0].measured.endswith(
-        "over the cheapest: dam_break: x 2, bead_area: x 2; dam_break: x 2, bead_area: x 2"
+    places = [("cost", EQUAL_ERROR, m) for m in METHODS]
+    same = asked(here, here, answers(2.0, 9.0, 1.0), answers(2.0, 9.0, 1.0))
+    assert [same[place].elsewhere for place in places] == [{"the other backend": CONFIRMED}] * 3
+    other = asked(here, here, answers(2.0, 9.0, 1.0), answers(1.0, 9.0, 2.0))
+    assert [bool(other[place].differs) for place in places] == [True, False, True]
+    assert not any(asked(here, here, answers(2.0, 9.0, 1.0))[place].elsewhere for place in places)
+
+
+def test_cost_is_asked_of_a_viscous_liquid_too():
+    """By explicit viscosity SPH takes eleven times the steps of MPM, by implicit as many."""
+    here = repeated(mpm=2.0, sph=9.0, pbd=1.0)
+    e = evidence(
+        repeats=here, explicit=repeated(mpm=1.0, sph=11.0, pbd=4.0), implicit=repeated(mpm=3.0, sph=2.0, pbd=1.0)
     )
-    cells = both(here, here, answers(2.0, 9.0, 1.0), answers(1.0, 9.0, 2.0))[5:8]
-    assert [c.verdict for c in cells] == [DIFFERS, HOLDS, DIFFERS]
-    cells = both(here, here, answers(2.0, 9.0, 1.0), [])[5:8]
-    assert [c.verdict for c in cells] == [OPEN] * 3 and cells[0].measured.endswith("; not run")
+    cells = [*cost(e), *claims(e)]
+    ask_elsewhere(cells, e)
+    by_place = {c.place: c for c in cells}
+    where = ["honey_line, explicit viscosity", "honey_line, implicit viscosity"]
+    assert list(by_place[EXPENSIVE].elsewhere) == where
+    assert [*by_place[EXPENSIVE].elsewhere.values()] == [CONFIRMED, REFUTED]
+    assert [*by_place["claims", SMALL_STEPS, "sph"].elsewhere.values()] == [CONFIRMED, REFUTED]
 
 
 # --- lengths and rows

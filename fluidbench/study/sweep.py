@@ -1,0 +1,171 @@
+"""`sweep`: a scenario over the points of a grid, through every method; many points in one launch where a method can."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Unpack
+
+from ..errors import UserError, quoted
+from ..method.verdict import Evidence, Verdict, evidence_of, lacking
+from ..registry import get_method
+from ..runs.experiment import CRASH, Experiment
+from ..runs.job import Job
+from ..runs.record import Run
+from ..scenario import Scenario
+from ..scenario.library import assign, validate
+from .result import Result
+from .sweep_report import report
+from .workplace import Options, Workplace, as_scenario, methods_of, require_number
+from .worlds import MOST, run_batches, shared
+
+WALL_LIMIT = 900.0  # s
+LARGEST = 10_000  # points
+PER_PROCESS = 8  # batches that a process on a GPU runs, one after the other: starting one takes longer than many runs
+Axes = Mapping[str, Sequence[Any]]
+
+
+@dataclass
+class Point:
+    """One point through one method, and what came of it: `together` points shared the launches and the cost."""
+
+    settings: dict[str, Any]
+    scenario: Scenario
+    method: str
+    verdict: str = ""
+    reason: str = ""
+    measures: dict[str, float] = field(default_factory=dict)
+    cost: dict[str, float] = field(default_factory=dict)
+    together: int = 1
+    run: Run | None = None  # where it ran alone
+
+    @property
+    def name(self) -> str:
+        """The point in words."""
+        return f"{self.method}, " + ", ".join(f"{key} = {value}" for key, value in self.settings.items())
+
+    @property
+    def evidence(self) -> Evidence:
+        return evidence_of(self.verdict)
+
+
+@dataclass(repr=False)
+class Sweep(Result):
+    """A scenario over a grid: `table` has a row for every point and method."""
+
+    points: list[Point] = field(default_factory=list)
+
+
+def sweep(
+    scenario: Scenario | str | Path,
+    over: Axes,
+    methods: Sequence[str] | None = None,
+    *,
+    worlds: int | None = None,
+    quick: bool = False,
+    **options: Unpack[Options],
+) -> Sweep:
+    """Run a scenario at every combination of values of some of its keys, through every method.
+
+    `scenario` is one, a shipped name (`quick`: its shorter version) or a TOML file. `over`: values by dotted key, as
+    {"material.yield_stress": [20, 65, 110]}, in SI units or with a unit; `methods` are names, default all. Points that
+    differ in their material, gravity, body force or seed alone run in the same launches, up to `worlds` at once:
+    default 64 on a GPU, and 1 on a CPU, where that saves nothing. They advance by the smallest step that any of them
+    needs. Where such a batch fails, its points run one by one. `options` are those of every verb, see Options.
+
+    Raises UserError for what cannot be run, before anything is.
+    """
+    resolved, names = as_scenario(scenario, quick), methods_of(methods, options)
+    if worlds is not None:
+        require_number(worlds, "worlds", 1, whole=True)
+    place = Workplace.of(options, WALL_LIMIT, names)
+    grid = points_of(resolved, over)
+    points = [Point(settings, s, method) for method in names for settings, s in grid]
+    most = worlds or (1 if place.target.device == "cpu" else MOST)
+    machine = run_shared(points, place, most)
+    run_alone([p for p in points if not p.verdict], place)
+    missing = lacking(points, refusals=False)
+    ok = any(p.evidence is Evidence.RESULT for p in points) and not missing
+    runs = [p.run for p in points if p.run is not None]
+    root = place.store.root
+    return Sweep(report(resolved, list(over), points, machine, root), root, runs, missing, ok, place.keeper, points)
+
+
+def points_of(scenario: Scenario, over: Axes) -> list[tuple[dict[str, Any], Scenario]]:
+    """(settings, scenario) of every point; the last key varies fastest. Raises UserError for a key or a value that the
+    scenario does not have, for none and for too many."""
+    if not isinstance(over, Mapping) or not over:
+        raise UserError("over: a key and its values are wanted, as material.yield_stress=20:200:5")
+    for key, values in over.items():
+        if isinstance(values, str | bytes) or not isinstance(values, Sequence) or not values:
+            raise UserError(f"over: {quoted(key)[1:-1]}: a list of values is wanted (got {quoted(values)})")
+        if len({str(value) for value in values}) < len(values):
+            raise UserError(f"over: {quoted(key)[1:-1]}: a value is named twice")
+    grid = list(itertools.islice(itertools.product(*over.values()), LARGEST + 1))
+    if len(grid) > LARGEST:
+        raise UserError(f"over: more than {LARGEST} points")
+    base, found = scenario.model_dump(mode="json", exclude_none=True), []
+    for values in grid:
+        settings = dict(zip(over, values, strict=True))
+        changed = Scenario.model_validate(base).model_dump(mode="json", exclude_none=True)
+        if "nozzle.exit_speed" in settings:
+            changed["nozzle"].pop("flow_rate", None)
+        for key, value in settings.items():
+            assign(changed, key, value)
+        where = ", ".join(f"{key} = {value}" for key, value in settings.items())
+        found.append((settings, validate(changed, f"{scenario.name} with {where}")))
+    return found
+
+
+def run_shared(points: Sequence[Point], place: Workplace, most: int) -> dict[str, str]:
+    """Run points that can share launches, and return on what; those of a batch that does not complete are left as they
+    were."""
+    machine: dict[str, str] = {}
+    several = 1 if place.target.device == "cpu" else PER_PROCESS
+    chunks: list[list[list[Point]]] = []
+    for method in dict.fromkeys(p.method for p in points):
+        own = [p for p in points if p.method == method]
+        groups = shared(get_method(method), [p.scenario for p in own], place.target, most)
+        batches = [[own[i] for i in group] for group in groups if len(group) > 1]
+        chunks += [batches[i : i + several] for i in range(0, len(batches), several)]
+    found = place.run([_experiment(chunk, place) for chunk in chunks], "batches", together=True) if chunks else []
+    for chunk, ended in zip(chunks, found, strict=True):
+        if CRASH in ended:
+            continue
+        machine = ended["machine"]
+        for batch, told in zip(chunk, ended["batches"], strict=True):
+            if told["verdict"] == Verdict.COMPLETED:
+                _tell(batch, told)
+    return machine
+
+
+def _tell(batch: Sequence[Point], told: dict[str, Any]) -> None:
+    """Give the points of a batch what came of it."""
+    for point, own in zip(batch, told["points"], strict=True):
+        point.verdict, point.measures = told["verdict"], own["measures"]
+        point.cost, point.together = told["cost"], len(batch)
+
+
+def _experiment(chunk: Sequence[Sequence[Point]], place: Workplace) -> Experiment:
+    first, number = chunk[0][0], sum(map(len, chunk))
+    task = {
+        "batches": [[p.scenario.model_dump(mode="json") for p in batch] for batch in chunk],
+        "method": first.method,
+        "target": asdict(place.target),
+        "wall_limit": place.wall_limit,
+    }
+    function = f"{run_batches.__module__}:{run_batches.__name__}"
+    return Experiment(function, f"{first.scenario.name}-{first.method}-x{number}", first.method, task, place.target)
+
+
+def run_alone(points: Sequence[Point], place: Workplace) -> None:
+    """Run points in processes of their own."""
+    planned = [
+        Job(p.scenario.model_dump(mode="json"), p.method, place.target, wall_limit=place.wall_limit) for p in points
+    ]
+    for point, run in zip(points, place.run(planned, "points", together=True) if planned else [], strict=True):
+        point.verdict, point.reason, point.run = run.verdict, run.reason, run
+        point.measures = run.record.measures
+        point.cost = run.record.cost.model_dump(exclude_none=True) if run.record.cost is not None else {}
