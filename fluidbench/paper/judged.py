@@ -226,7 +226,7 @@ def limits(e: Evidence) -> list[Cell]:
         first, last = (bound_dt(e.scenario, "sph", {key: value} | scheme) for value in ends)
         verdict = CONFIRMED if first / last >= words.COLLAPSE else REFUTED
         measured = f"dt {first:.3g} s at {ends[0]:g} {unit}, {last:.3g} s at {ends[1]:g}: {first / last:.3g}-fold"
-        brief = f"step shrinks {first / last:.3g}-fold"
+        brief = "step as it is" if first / last < 1.01 else f"step shrinks {first / last:.3g}-fold"
         found.append(Cell("limits", aspect, "sph", paper, brief, measured, "bounds", "collapse", verdict))
     return [*found, physical_accuracy(e)]
 

@@ -41,8 +41,8 @@ class Published(Table1):
     """The same from studies that were kept; the runs' own folders are elsewhere."""
 
     def save(self, folder: str | Path | None = None) -> Path:
-        """Write tables, pictures and page."""
-        return write(self.report, self.root if folder is None else Path(folder))
+        """Write tables and page."""
+        return write(self.report, self.root if folder is None else Path(folder), pictures=False)
 
 
 def table1(

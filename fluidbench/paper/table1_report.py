@@ -18,15 +18,13 @@ from .definitions import CONFIRMED, METHODS, OPEN, REFUTED, RULES
 from .evidence import Evidence
 from .judged import cells as judged
 from .repeat import commands
+from .table1_text import DEPENDS, MARKS, WORDS, latex, markdown
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from ..study.trials import Trial
 
-DEPENDS = "depends on where"
-MARKS = {CONFIRMED: "✓", REFUTED: "✗", OPEN: "?", DEPENDS: "≠"}
-WORDS = {CONFIRMED: "confirmed", REFUTED: "refuted", OPEN: "open", DEPENDS: "depends"}  # where signs cannot be set
 NOTE = f"✓ {CONFIRMED}; ✗ {REFUTED}; ? open; ≠ the rule decides otherwise elsewhere, see the evidence"
 
 Studies = Mapping[str, Evidence]
@@ -41,6 +39,9 @@ def report(studies: Studies, root: Path) -> Report:
     findings += [sentence(place) for place in found if verdict(place) in (OPEN, DEPENDS)]
     scenario = next(iter(studies.values())).scenario.name
     shown = matrix(found, len(studies) > 1)
+    again = {label: commands(e) for label, e in studies.items()}
+    details = [*(_detail(place, again, root) for place in found), _rules()]
+    made = [f"{label}: {machine_of(e.sweeps())}" for label, e in studies.items()]
     return Report(
         "table1",
         f"fluidbench table1: {scenario}",
@@ -48,10 +49,10 @@ def report(studies: Studies, root: Path) -> Report:
         findings,
         [shown],
         _data(found),
-        [plot for e in studies.values() for plot in _work_precision(e.trials)],
-        details=[*(_detail(place, studies, root) for place in found), _rules()],
-        machine="; ".join(dict.fromkeys(machine_of(e.sweeps()) for e in studies.values())),
-        files={"table1.md": markdown(shown, findings[0], studies), "table1.tex": latex(shown)},
+        _work_precision(next(iter(studies.values())).trials),
+        details=details,
+        machine="; ".join(made),
+        files={"table1.md": markdown(shown, findings, details, made), "table1.tex": latex(shown)},
     )
 
 
@@ -100,7 +101,7 @@ def _statement(place: Place, several: bool) -> list[str]:
     return [head, *(f"  {MARKS[c.verdict]} {label}: {c.brief}" for label, c in place)]
 
 
-def _detail(place: Place, studies: Studies, root: Path) -> Detail:
+def _detail(place: Place, again: Mapping[str, Mapping[str, str]], root: Path) -> Detail:
     """What stands behind a cell: per study what was measured, what the verdict hangs on, and the runs."""
     first = place[0][1]
     made = Detail(f"{MARKS[verdict(place)]} {first.name}", anchor(first.name))
@@ -109,9 +110,8 @@ def _detail(place: Place, studies: Studies, root: Path) -> Detail:
         if cell.sensitivity:
             made.lines.append(f"What it hangs on: {cell.sensitivity}.")
         made.lines += [f"Elsewhere: {where}: {v}." for where, v in cell.elsewhere.items()]
-        again = commands(studies[label])
         for run in {r.folder: r for r in cell.runs}.values():
-            made.add_run(run, root, again.get(run.folder.name, ""))
+            made.add_run(run, root, again[label].get(run.folder.name, ""))
     made.lines.append(f"Rule: {RULES[first.rule]}. Experiment: {first.experiment}.")
     return made
 
@@ -138,35 +138,3 @@ def _data(found: Sequence[Place]) -> pd.DataFrame:
         folders = " ".join(run.folder.name for run in cell.runs)
         rows.append({"study": label, **row, "elsewhere": elsewhere, "runs": folders})
     return pd.DataFrame(rows)
-
-
-def markdown(table: Table, count: str, studies: Studies) -> str:
-    """The table as text for a page."""
-    import pandas as pd
-
-    rows = [[row[0], *("<br>".join(cell) for cell in row[1:])] for row in table.rows]
-    shown = pd.DataFrame(rows, columns=pd.Index(table.head)).map(lambda cell: cell.replace("|", "\\|"))
-    made = [f"- {label}: {machine_of(e.sweeps())}" for label, e in studies.items()]
-    return "\n".join(
-        [shown.to_markdown(index=False, disable_numparse=True), "", f"{count} {table.note}.", "", *made, ""]
-    )
-
-
-def latex(table: Table) -> str:
-    """The table for a paper, with booktabs; its signs as words."""
-    lines = [r"\begin{tabular}{l" + len(METHODS) * "p{0.28\\linewidth}" + "}", r"\toprule"]
-    lines += [" & ".join(h.upper() for h in table.head) + r" \\", r"\midrule"]
-    for row in table.rows:
-        texts = [row[0], *(r" \newline ".join(_escaped(line) for line in cell) for cell in row[1:])]
-        lines.append(" & ".join(texts) + r" \\")
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])
-
-
-def _escaped(text: str) -> str:
-    """A line with its mark, if it begins with one, as a word."""
-    text = text.strip()
-    for verdict, mark in MARKS.items():
-        text = f"[{WORDS[verdict]}] {text[2:]}" if text.startswith(f"{mark} ") else text
-    for sign, word in {**{c: f"\\{c}" for c in "%_&#$"}, ">=": "$\\geq$"}.items():
-        text = text.replace(sign, word)
-    return text

@@ -144,20 +144,19 @@ def at_equal_error(trials: Sequence[Trial]) -> dict[str, float]:
 
 
 def at_equal_cost(trials: Sequence[Trial]) -> dict[str, float]:
-    """Error of each method at the cost of the cheapest one's finest run, by the same laws."""
+    """Error of each method at the least cost that all of them were run at, by a power law through its spacings; of one
+    whose finest run is cheaper, that run's."""
     curves = _curves(trials)
-    target = min((p[:, 1].max() for p in curves.values()), default=0.0)
-    return {m: math.exp(_falling(target, p[:, 1], p[:, 0])) for m, p in curves.items()}
+    target = max((p[:, 1].min() for p in curves.values()), default=0.0)
+    return {m: math.exp(_falling(min(target, p[:, 1].max()), p[:, 1], p[:, 0])) for m, p in curves.items()}
 
 
 def _falling(target: float, x: np.ndarray, y: np.ndarray) -> float:
-    """y at x = target on the line through the points; where y does not fall with x, the least y up to there (or the
-    y of the least x, where all lie beyond)."""
+    """y at x = target on the line through the points; where y does not fall with x, the least y up to there."""
     fit = np.polyfit(x, y, 1)
     if fit[0] < 0:
         return float(np.polyval(fit, target))
-    there = x <= target + 1e-9
-    return float(y[there].min() if there.any() else y[np.argmin(x)])
+    return float(y[x <= target + 1e-9].min())
 
 
 def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, dict[str, float]]:

@@ -37,8 +37,9 @@ def page(report: Report, images: dict[str, bytes]) -> str:
     from plotly.offline import get_plotlyjs
 
     def drawn(plots: list[Plot]) -> list[Markup]:
-        config = {"displaylogo": False}
-        return [Markup(interactive(p).to_html(full_html=False, include_plotlyjs=False, config=config)) for p in plots]
+        shape = {"full_html": False, "include_plotlyjs": False, "default_width": "100%", "default_height": "100%"}
+        config = {"displaylogo": False, "responsive": True}
+        return [Markup(interactive(p).to_html(config=config, **shape)) for p in plots]
 
     lists = [
         ("Runs that are not results", report.failures, "bad"),
@@ -89,8 +90,10 @@ def interactive(plot: Plot) -> Any:
         xaxis_title=plot.x,
         yaxis_title=plot.y,
         template="plotly_white",
-        height=360,
-        margin={"l": 60, "r": 20, "t": 50, "b": 50},
+        autosize=True,
+        margin={"l": 60, "r": 40, "t": 40, "b": 50},
+        legend={"orientation": "h", "yanchor": "top", "y": -0.22},
+        modebar={"orientation": "v"},  # beside the plot, not over its title
     )
     if plot.log:
         figure.update_xaxes(type="log")

@@ -102,8 +102,9 @@ def machine_of(runs: Iterable[Run]) -> str:
     return "; ".join(f"{key} {value}" for key, value in first.items())
 
 
-def write(report: Report, root: Path) -> Path:
-    """Write VERB.parquet, VERB.csv, VERB.json, a PNG for each plot and image, and the page; returns the page."""
+def write(report: Report, root: Path, pictures: bool = True) -> Path:
+    """Write VERB.parquet, VERB.csv, VERB.json, a PNG for each image and, where `pictures` are wanted, each plot, and
+    the page; returns the page."""
     from .figures import draw
     from .page import page
 
@@ -113,7 +114,7 @@ def write(report: Report, root: Path) -> Path:
     write_atomically(root / f"{report.verb}.json", json.dumps({"findings": report.findings, "rows": rows}, indent=1))
     for name, text in report.files.items():
         write_atomically(root / name, text)
-    for plot in report.every_plot():
+    for plot in report.every_plot() if pictures else []:
         write_atomically(root / f"{report.prefix}{plot.name}.png", draw(plot))
     images = {image.name: image.draw() for image in report.images}
     for name, data in images.items():

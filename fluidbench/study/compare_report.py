@@ -9,10 +9,12 @@ from ..method.verdict import Verdict
 from ..report.report import Report, machine_of, record_link
 from ..runs.record import Run
 from ..scenario.measured import Measured
+from .again import settings_of
 from .compare_measured import against_measured, measured_plot, values_of
 from .compare_plots import plots
 from .compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
 from .compare_views import views
+from .headline import headline
 
 ADVICE = {
     Verdict.DIVERGED: "its results are left out of every comparison",
@@ -37,8 +39,8 @@ def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measur
     return Report(
         verb,
         f"fluidbench {verb.partition('-')[0]}: {runs[0].record.scenario}",
-        first.scenario.title if first else "",
-        [],
+        _opening(first, runs, verb) if first else "",
+        headline(runs) if len({run.label for run in runs}) > 1 else [],
         [table for table in made if table is not None],
         pd.DataFrame([{**run.record.row(), "reused": run.reused} for run in runs]),
         [*measured_plot(values, measured), *plots(runs, measured)],
@@ -53,3 +55,13 @@ def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measur
         images=views(runs),
         prefix="" if verb == "compare" else f"{verb}-",
     )
+
+
+def _opening(first: Run, runs: Sequence[Run], verb: str) -> str:
+    """What was run: the scenario's title, and the command where it is a shipped one."""
+    title, settings = first.scenario.title, settings_of(first.record)
+    if settings is None or verb != "compare":
+        return title
+    methods = ",".join(dict.fromkeys(run.method for run in runs))
+    command = f"fluidbench compare {first.record.scenario} --solvers {methods}{settings}{first.target.options}"
+    return f"{title[:1].upper()}{title[1:]}. Made by: {command}"

@@ -218,14 +218,14 @@ def test_time_is_that_of_the_processor_where_the_machine_is_shared():
 
 
 def test_error_at_the_cost_that_all_can_pay():
-    """Error ~ cost^-1/2: at the 16 s that the cheapest one's finest run takes, 0.1 and 0.4 / 4; where it does not fall
-    the best one up to there."""
-    found = at_equal_cost(laws(LIQUID, mpm=[(0.4, 1.0), (0.1, 16.0)], sph=[(0.4, 1.0), (0.05, 64.0)]))
-    assert found == pytest.approx({"mpm": 0.1, "sph": 0.1})
+    """Error ~ cost^-1/2: at 4 s, the dearest one's cheapest run, 0.2 and 0.4; where it does not fall, the best one up
+    to there; and of who ends before, the last."""
+    found = at_equal_cost(laws(LIQUID, mpm=[(0.4, 1.0), (0.1, 16.0)], sph=[(0.4, 4.0), (0.1, 64.0)]))
+    assert found == pytest.approx({"mpm": 0.2, "sph": 0.4})
     rising = at_equal_cost(laws(LIQUID, mpm=[(0.4, 1.0), (0.1, 16.0)], sph=[(0.3, 4.0), (0.5, 64.0)]))
     assert rising["sph"] == pytest.approx(0.3) and at_equal_cost([]) == {}
-    late = at_equal_cost(laws(LIQUID, mpm=[(0.4, 1.0), (0.1, 2.0)], sph=[(0.3, 4.0), (0.5, 64.0)]))
-    assert late["sph"] == pytest.approx(0.3)  # beyond its reach the cheapest stands for it
+    early = at_equal_cost(laws(LIQUID, mpm=[(0.4, 1.0), (0.2, 2.0)], sph=[(0.3, 8.0), (0.1, 64.0)]))
+    assert early["mpm"] == pytest.approx(0.2)
 
 
 def test_real_time_is_where_a_second_takes_a_second():
