@@ -52,8 +52,7 @@ def sweep(
 ) -> None:
     """Run a scenario at every combination of values of some of its keys, through every method.
 
-    Points that differ in material, gravity, body force or seed alone share launches on a GPU. A second call reuses
-    what is finished.
+    Points that differ in material or body force alone share launches on a GPU. A second call reuses what is finished.
     """
     from ..study.sweep import sweep as study
 

@@ -4,8 +4,8 @@ to judge the table again, elsewhere and later."""
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from .evidence import GROUPS, Evidence
 
 INDEX, RECORDS = "evidence.json", "records.parquet"
 TRIALS = ("trials", "other_trials")
+OWN = ("method", "level", "spacing", "verdict", "note")  # of a trial
 
 
 def keep(e: Evidence, folder: Path) -> None:
@@ -48,10 +49,16 @@ def _told(t: Trial) -> dict[str, Any]:
     found = t.finding
     return {
         "case": t.case.name,
-        **{key: getattr(t, key) for key in ("method", "level", "spacing", "verdict", "note", "cost")},
-        "finding": found and {"error": found.error, "numbers": [asdict(n) for n in found.numbers]},
+        **{key: getattr(t, key) for key in OWN},
+        "cost": {key: float(value) for key, value in t.cost.items()},
+        "tolerance": t.tolerance,
+        "finding": found and {"error": float(found.error), "numbers": [_plain(n) for n in found.numbers]},
         "runs": {label: run.folder.name for label, run in t.runs.items()},
     }
+
+
+def _plain(n: Number) -> dict[str, Any]:
+    return {"quantity": n.quantity, "measured": float(n.measured), "reference": float(n.reference)}
 
 
 def restore(folder: Path) -> Evidence:
@@ -85,9 +92,12 @@ def _pick(runs: dict[str, Run], names: Iterable[str]) -> list[Run]:
 def _trial(told: dict[str, Any], runs: dict[str, Run]) -> Trial:
     found = told["finding"]
     finding = found and Finding(found["error"], tuple(Number(**n) for n in found["numbers"]))
-    own = {key: told[key] for key in ("method", "level", "spacing", "verdict", "note", "cost")}
+    own = {key: told[key] for key in OWN}
     made = {label: runs[name] for label, name in told["runs"].items()}
-    return Trial(cases()[told["case"]], **own, finding=finding, runs=made)
+    trial = Trial(cases()[told["case"]], **own, finding=finding, runs=made, cost=told["cost"])
+    if not math.isclose(trial.tolerance, told.get("tolerance", trial.tolerance), rel_tol=1e-9):
+        raise UserError(f"{trial.name} was judged by a tolerance of {told['tolerance']:g}, which is now another")
+    return trial
 
 
 def archives(folder: Path) -> dict[str, Evidence]:
@@ -105,4 +115,11 @@ def archives(folder: Path) -> dict[str, Evidence]:
     for place in places:
         e = restore(place)
         found[e.label if e.label not in found else f"{e.label}, {place.name}"] = e
+    if len({_subject(e) for e in found.values()}) > 1:
+        raise UserError(f"{quoted(str(folder))[1:-1]}: studies of different scenarios are not put side by side")
     return found
+
+
+def _subject(e: Evidence) -> str:
+    """What it is a study of, chance apart."""
+    return e.scenario.model_copy(update={"seed": 0, "jitter": 0.0}).model_dump_json()

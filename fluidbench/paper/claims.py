@@ -17,6 +17,7 @@ from .verdicts import answers_to, high, sensitivity, share_is, told, within
 
 STRUCTURE = "predicts structural response more reliably"
 SURFACE, STRUGGLES = "captures free-surface flow well", "struggles with curing and elasticity"
+UNTOLD = "not every method has a result"
 WIDTH, DEFORMATION = "cannot predict bead width", "cannot predict deformation under load"
 COLLAPSE = "cannot predict collapse"
 
@@ -35,19 +36,18 @@ def claims(e: Evidence) -> list[Cell]:
 
 def steps_and_cost(e: Evidence) -> list[Cell]:
     """What SPH would need in this setting."""
-    found, runs = [], all_runs(e)
-    dts, walls = figures(e.repeats, "mean_dt_s"), paces(e.repeats)
+    runs, dts, walls = all_runs(e), figures(e.repeats, "mean_dt_s"), paces(e.repeats)
+    steps = costs = measured = UNTOLD
     if {"mpm", "sph"} <= set(dts):
-        said = f"dt is 1 / {mean(dts['mpm']) / mean(dts['sph']):.2f} of MPM's"
-        verdict = small_steps(e.repeats)
-        found.append(_claim("sph", SMALL_STEPS, said, said, "compare", "collapse", verdict, runs))
+        steps = f"dt is 1 / {mean(dts['mpm']) / mean(dts['sph']):.2f} of MPM's"
     if len(walls) == 3:
         measured = "s for a simulated second: " + ", ".join(f"{m} {mean(v):.3g}" for m, v in walls.items())
-        over = {m: mean(walls["sph"]) / mean(walls[m]) for m in ("mpm", "pbd")}
-        brief = ", ".join(f"x {x:.2g} {m}'s" for m, x in over.items())
-        verdict = cost_place(e.repeats, "sph", "highest")
-        found.append(_claim("sph", MOST_EXPENSIVE, brief, measured, "compare", "cost", verdict, runs))
-    return found
+        costs = ", ".join(f"x {mean(walls['sph']) / mean(walls[m]):.2g} {m}'s" for m in ("mpm", "pbd"))
+    dear = cost_place(e.repeats, "sph", "highest")
+    return [
+        _claim("sph", SMALL_STEPS, steps, steps, "compare", "collapse", small_steps(e.repeats), runs),
+        _claim("sph", MOST_EXPENSIVE, costs, measured, "compare", "cost", dear, runs),
+    ]
 
 
 def _claim(method: str, aspect: str, brief: str, measured: str, experiment: str, rule: str, verdict: str, runs) -> Cell:
@@ -148,7 +148,8 @@ def bead_width(e: Evidence) -> Cell:
         off.append(abs(n.measured / n.reference - 1.0))
         lines.append(f"{n.quantity}: {n.measured:.3g} of {n.reference:.3g}: off by {off[-1]:.0%}")
     verdict = OPEN
-    if agree and off and told(strands):
+    whole = all(t.finding is not None for t in strands) and all(map(math.isfinite, off))
+    if agree and off and whole:
         verdict = CONFIRMED if sum(x > APART for x in off) > len(off) / 2 else REFUTED
     runs = [runs[0] for level in (e.repeats, e.second) for runs in level.values() if runs] + runs_of(strands)
     measured = "; ".join(lines) or "a method did not lay a bead"

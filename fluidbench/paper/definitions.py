@@ -46,8 +46,8 @@ RULES = {
     f"at most {POOR:.0%}; a class needs {FEWEST} of them. Beside it: the error at equal cost",
     "step": f"methods ordered by the largest dt over d/c that a thrown lump survives, at two spacings; a place needs a "
     f"factor of {EFFECT:g} and two standard deviations",
-    "equal error": f"ordered by the time to reach the error that all three reach, a factor of {EFFECT:g} apart, on "
-    f"most of at least {FEWEST} cases",
+    "equal error": f"ordered by the time to reach the error that all three reach (of a method that was never so far "
+    f"off, of its cheapest run), a factor of {EFFECT:g} apart, on most of at least {FEWEST} cases",
     "cost": f"methods ordered by the figure; a place needs a factor of {EFFECT:g}, and means more than two standard "
     "deviations of the repeats apart. Time is CPU time on a CPU, where a run has one thread, and wall time on a GPU",
     "best": "the method that is cheapest, among those within tolerance, on most known answers of the class",

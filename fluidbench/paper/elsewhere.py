@@ -52,5 +52,7 @@ def ask_elsewhere(cells: list[Cell], e: Evidence) -> None:
         if cell.place in asked:
             cell.elsewhere |= {where: asked[cell.place](runs) for where, runs in scenes.items() if runs}
         if cell.place[:2] == ("cost", EQUAL_ERROR) and e.other_trials:
-            verdict, _ = equal_error(e.other_trials, cell.method, COST_PLACES[cell.method][1])
-            cell.elsewhere["the other backend"] = verdict
+            place, levels = COST_PLACES[cell.method][1], {t.level for t in e.other_trials}
+            here, _ = equal_error([t for t in e.trials if t.level in levels], cell.method, place)
+            if here == cell.verdict:  # else the spacings decide, not the backend
+                cell.elsewhere["the other backend"] = equal_error(e.other_trials, cell.method, place)[0]

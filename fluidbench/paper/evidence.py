@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..measure.reference import table as reference
-from ..method.target import Target
+from ..method.target import DEFAULT_BACKEND, Target
 from ..method.verdict import lacking
 from ..registry import get_method
 from ..runs.job import Job
@@ -77,7 +77,8 @@ class Evidence:
         """What sets it apart from another study: the device, and the seed where one was given."""
         machines = (run.record.machine for runs in self.repeats.values() for run in runs)
         device = next((machine["device"] for machine in machines if "device" in machine), "CPU")
-        return device + f", seed {self.seed}" * (self.seed > 0)
+        backend = next((run.record.backend for runs in self.repeats.values() for run in runs), DEFAULT_BACKEND)
+        return device + f", {backend}" * (backend != DEFAULT_BACKEND) + f", seed {self.seed}" * (self.seed > 0)
 
     def group(self, name: str) -> Runs:
         """One of GROUPS."""

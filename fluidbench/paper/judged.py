@@ -18,7 +18,7 @@ from ..study.points import HELD, varied
 from ..study.trials import Trial
 from . import definitions as words
 from .cells import Cell, all_runs, figures, paces, runs_of
-from .claims import claims
+from .claims import UNTOLD, claims
 from .definitions import CONFIRMED, COST_CASES, COST_PLACES, EFFECT, FEWEST, METHODS, OPEN, REFUTED
 from .elsewhere import EQUAL_ERROR, EQUAL_SPACING, ask_elsewhere, cost_place
 from .evidence import SHIPPED, Evidence
@@ -34,6 +34,7 @@ from .verdicts import (
     ranked,
     sensitivity,
     share_is,
+    told,
     winners,
     within,
 )
@@ -127,13 +128,15 @@ def stability(e: Evidence) -> list[Cell]:
         for m, rows in e.limits.items()
     }
     places = ranked({m: v for m, v in measured.items() if len(v) >= FEWEST and len(v) == len(e.limits[m])})
+    more = {m for m, rows in e.limits.items() if any(not r.get("lump_limit_found", True) for r in rows)}
+    known = len(places) == 3 and all(places[m][1] == 0 for m in more)  # what may be more is nobody's lower
     found = []
     for m, (word, place) in paper.items():
-        beyond = ">= " if any(not r.get("lump_limit_found", True) for r in e.limits.get(m, [])) else ""
+        beyond = ">= " if m in more else ""
         steps = [f"{v:.2f}" for v in measured.get(m, [])]
         text = f"largest stable dt {beyond}{' and '.join(steps) or 'not found'} d/c"
         text += f"; mean default dt {mean(dts[m]):.3g} s" if m in dts else ""
-        verdict = placed(places[m], place) if len(places) == 3 else OPEN
+        verdict = placed(places[m], place) if known else OPEN
         brief = f"stable to {beyond}{', '.join(steps) or '?'} d/c"
         runs = e.repeats.get(m, [])
         found.append(Cell("stability and dt", "", m, word, brief, text, "stability, compare", "step", verdict, runs))
@@ -144,13 +147,13 @@ def cost(e: Evidence) -> list[Cell]:
     walls = paces(e.repeats)
     found = []
     for m, (word, place) in COST_PLACES.items():
+        brief, measured, verdict, runs = UNTOLD, UNTOLD, OPEN, e.repeats.get(m, [])
         if m in walls:
             spread = stdev(walls[m]) if len(walls[m]) > 1 else 0.0
             brief = f"{mean(walls[m]):.3g} s a simulated s"
             measured = f"{mean(walls[m]):.3g} ± {spread:.1g} s for a simulated second"
             verdict = cost_place(e.repeats, m, place)
-            runs = e.repeats[m]
-            found.append(Cell("cost", EQUAL_SPACING, m, word, brief, measured, "compare", "cost", verdict, runs))
+        found.append(Cell("cost", EQUAL_SPACING, m, word, brief, measured, "compare", "cost", verdict, runs))
     for m, (word, place) in COST_PLACES.items():
         verdict, shares = equal_error(e.trials, m, place)
         measured = "over the cheapest: " + ", ".join(f"{n}: x {x:.2g}" for n, x in shares.items())
@@ -173,11 +176,13 @@ def best_for(e: Evidence) -> list[Cell]:
         def judge(trials: Sequence[Trial], factor: float, m: str = m, physics: Sequence[str] = physics) -> str:
             wins = winners(trials, physics, factor)
             judged = sum(wins.values())
-            return OPEN if judged < FEWEST else CONFIRMED if wins.get(m, 0) > judged / 2 else REFUTED
+            if judged < FEWEST or not told(trials):
+                return OPEN
+            return CONFIRMED if wins.get(m, 0) > judged / 2 else REFUTED
 
         own = answers_of(e.trials, METHODS, physics)
         wins = winners(own, physics)
-        shown = ", ".join(f"{k} {n}" for k, n in sorted(wins.items(), key=lambda item: -item[1])) or "none"
+        shown = ", ".join(f"{k} {n}" for k, n in sorted(wins.items(), key=lambda item: -item[1])) or "no case"
         brief = f"cheapest on {wins.get(m, 0)} of {sum(wins.values())}"
         measured, verdict = f"cheapest within tolerance on: {shown}", judge(own, 1.0)
         runs, hangs = runs_of(own), sensitivity(own, judge)
@@ -209,13 +214,7 @@ def previews(e: Evidence) -> Cell:
 
 def limits(e: Evidence) -> list[Cell]:
     found = []
-    sizes = figures(e.repeats, "bytes_per_particle")
-    if len(sizes) == 3:
-        volume = e.scenario.spacing**3
-        measured = ", ".join(f"{m} {v[0]:.0f} B ({v[0] / volume / 1e9:.3g} GB/m^3)" for m, v in sizes.items())
-        brief = f"{sizes['mpm'][0]:.0f} B a particle (sph {sizes['sph'][0]:.0f}, pbd {sizes['pbd'][0]:.0f})"
-        verdict, runs = placed(ranked(sizes)["mpm"], "highest"), all_runs(e)
-        found.append(Cell("limits", "memory", "mpm", "memory", brief, measured, "compare", "cost", verdict, runs))
+    found.append(memory(e))
     found.append(grid_artifacts(e))
     for aspect, paper, key, ends, unit, more in (
         ("explicit viscosity", "high viscosity", "material.viscosity", VISCOSITIES, "Pa s", "explicit"),
@@ -229,6 +228,17 @@ def limits(e: Evidence) -> list[Cell]:
         brief = "step as it is" if first / last < 1.01 else f"step shrinks {first / last:.3g}-fold"
         found.append(Cell("limits", aspect, "sph", paper, brief, measured, "bounds", "collapse", verdict))
     return [*found, physical_accuracy(e)]
+
+
+def memory(e: Evidence) -> Cell:
+    sizes = figures(e.repeats, "bytes_per_particle")
+    brief, measured, verdict = UNTOLD, UNTOLD, OPEN
+    if len(sizes) == 3:
+        volume = e.scenario.spacing**3
+        measured = ", ".join(f"{m} {v[0]:.0f} B ({v[0] / volume / 1e9:.3g} GB/m^3)" for m, v in sizes.items())
+        brief = f"{sizes['mpm'][0]:.0f} B a particle (sph {sizes['sph'][0]:.0f}, pbd {sizes['pbd'][0]:.0f})"
+        verdict = placed(ranked(sizes)["mpm"], "highest")
+    return Cell("limits", "memory", "mpm", "memory", brief, measured, "compare", "cost", verdict, all_runs(e))
 
 
 def bound_dt(scenario: Scenario, method: str, settings: dict[str, Any]) -> float:
@@ -246,7 +256,8 @@ def grid_artifacts(e: Evidence) -> Cell:
     brief = f"area off {', '.join(shown.get(1.0, []))} at 1 a cell, {', '.join(shown.get(2.0, []))} at 8"
     blown = [r.evidence is Weight.INSTABILITY for r in e.grids.get(1.0, [])]
     verdicts = [OPEN]
-    if all(len(off.get(g, [])) == 2 for g in (2.0, 3.0)):
+    finite = all(math.isfinite(a) for g in (1.0, 2.0, 3.0) for a in off.get(g, []))
+    if finite and all(len(off.get(g, [])) == 2 for g in (2.0, 3.0)):
         if len(off.get(1.0, [])) == 2:
             full = [max(EFFECT * max(off[2.0][i], off[3.0][i]), words.ARTIFACT) for i in range(2)]
             verdicts = [CONFIRMED if off[1.0][i] > full[i] else REFUTED for i in range(2)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Unpack
 
+from ..errors import UserError
 from ..method.target import Target
 from ..report.report import write
 from ..scenario import Scenario
@@ -66,6 +67,9 @@ def table1(
     resolved = shaken(as_scenario(scenario), seed)
     if quick and not isinstance(scenario, Scenario):
         resolved = resolved.replace(spacing=coarser(resolved))
+    require_number(repeats, "repeats", 2, whole=True)
+    if resolved.nozzle is None or resolved.toolpath is None or resolved.toolpath.speed == 0:
+        raise UserError(f"{resolved.name}: the table is judged on a bead that a moving nozzle lays, such as line_bead")
     place = Workplace.of(options, WALL_LIMIT, METHODS)
     chosen = chosen_cases(quick)
     trials = known_answers(chosen, place, place.target, quick, seed)
@@ -89,7 +93,8 @@ def published(folder: str | Path, out: str | Path | None = None) -> Published:
     studies = archives(Path(folder).expanduser())
     root = Path(folder if out is None else out).expanduser().absolute()
     runs = [found for e in studies.values() for found in e.runs()]
-    return Published(report(studies, root), root, runs, [], studies=studies)
+    missing = [f"{label}: {line}" for label, e in studies.items() for line in e.missing()]
+    return Published(report(studies, root), root, runs, missing, not missing, studies=studies)
 
 
 def coarser(scenario: Scenario) -> float:

@@ -77,8 +77,13 @@ def sentence(place: Place) -> str:
     """A cell as a finding."""
     first = place[0][1]
     told = [f"{f'{label}: ' if len(place) > 1 else ''}{c.verdict}. {c.measured}" for label, c in place]
-    differs = dict(chain.from_iterable(c.differs.items() for _, c in place))
-    return f"{first.name}: {'; '.join(told)}." + "".join(f" But {v}: {where}." for where, v in differs.items())
+    differs = [f" But {v}: {_in(label, place)}{where}." for label, c in place for where, v in c.differs.items()]
+    return f"{first.name}: {'; '.join(told)}.{''.join(differs)}"
+
+
+def _in(label: str, place: Place) -> str:
+    """The study's name, where there are several."""
+    return f"{label}, " if len(place) > 1 else ""
 
 
 def matrix(found: Sequence[Place], several: bool) -> Table:

@@ -28,6 +28,8 @@ from .definitions import (
     TOLERANCES,
 )
 
+BEYOND = math.log(100.0)  # how far a power law may be drawn out
+
 
 def answers_of(trials: Sequence[Trial], methods: Sequence[str], physics: Sequence[str]) -> list[Trial]:
     """The known answers of these methods and classes that count."""
@@ -136,11 +138,11 @@ def _curves(trials: Sequence[Trial]) -> dict[str, np.ndarray]:
 
 def at_equal_error(trials: Sequence[Trial]) -> dict[str, float]:
     """Time [s] of each method at the error that the worst of them reaches at its best: by a power law through its
-    spacings, or, where its error does not fall with cost, its cheapest run within that error. Nothing where a run says
-    nothing of its method."""
+    spacings, or, where its error does not fall with cost, its cheapest run within that error; of one that was never so
+    far off, its cheapest run. Nothing where a run says nothing of its method."""
     curves = _curves(trials)
     target = max((p[:, 0].min() for p in curves.values()), default=0.0)
-    return {m: math.exp(_falling(target, p[:, 0], p[:, 1])) for m, p in curves.items()}
+    return {m: math.exp(_falling(min(target, p[:, 0].max()), p[:, 0], p[:, 1])) for m, p in curves.items()}
 
 
 def at_equal_cost(trials: Sequence[Trial]) -> dict[str, float]:
@@ -161,6 +163,8 @@ def _falling(target: float, x: np.ndarray, y: np.ndarray) -> float:
 
 def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, dict[str, float]]:
     """(verdict on a method's place, its time over the cheapest's by case) at the error that all three reach."""
+    if not told([t for t in trials if t.case.name in COST_CASES and t.judged]):
+        return OPEN, {}
     every = {name: at_equal_error([t for t in trials if t.case.name == name]) for name in COST_CASES}
     equal = {name: costs for name, costs in every.items() if len(costs) == 3}
     shares = {name: costs[method] / min(costs.values()) for name, costs in equal.items()}
@@ -171,15 +175,17 @@ def equal_error(trials: Sequence[Trial], method: str, place: str) -> tuple[str, 
 
 
 def winners(trials: Sequence[Trial], physics: Sequence[str], factor: float = 1.0) -> dict[str, int]:
-    """On how many cases each method is the cheapest of those within a factor of the tolerance."""
+    """On how many cases each method is the cheapest of those within a factor of the tolerance; "none" where nobody
+    is. A case of which a run says nothing of its method does not count."""
     wins: dict[str, int] = {}
     rows = [t for t in answers_of(trials, METHODS, physics) if t.case.drive is None]
     for name in dict.fromkeys(t.case.name for t in rows):
         own = [t for t in rows if t.case.name == name]
+        if not told(own):
+            continue
         good = [t for t in own if t.error <= factor * t.tolerance]
-        if good and told(own):
-            first = min(good, key=seconds).method
-            wins[first] = wins.get(first, 0) + 1
+        first = min(good, key=seconds).method if good else "none"
+        wins[first] = wins.get(first, 0) + 1
     return wins
 
 
@@ -190,10 +196,12 @@ def pace(run: Run) -> float:
 
 def in_real_time(runs: Sequence[Run]) -> float:
     """The most particles with which a simulated second takes no more than one, by a power law through these runs; NaN
-    where it does not rise with their number, or fewer than two have a result."""
-    points = [(run.cost.peak_particles, pace(run)) for run in runs if run.ok]
-    if len({n for n, _ in points}) < 2:
+    where one has no result, where time does not rise with their number, or where that is too far beyond them to say."""
+    if len(runs) < 2 or not all(run.ok for run in runs):
         return math.nan
-    n, cost = np.log(np.array(points, dtype=float)).T
+    n, cost = np.log([(run.cost.peak_particles, pace(run)) for run in runs]).T
+    if len(set(n)) < 2:
+        return math.nan
     slope, at_one = np.polyfit(n, cost, 1)
-    return math.exp(-at_one / slope) if slope > 0 else math.nan
+    found = -at_one / slope if slope > 0 else math.inf
+    return math.exp(found) if n.min() - BEYOND <= found <= n.max() + BEYOND else math.nan

@@ -12,11 +12,13 @@ from ..scenario.library import load, shipped
 
 def settings_of(record: Record) -> str | None:
     """What the scenario of a run has otherwise than the shipped one of its name, as ` --set key=value ...`; None where
-    there is none of that name."""
+    there is none of that name, or no words for it."""
     if record.scenario not in shipped() or record.input is None:
         return None
     base, own = _flat(_shipped(record.scenario)), _flat(record.input)
     changed = {key: own.get(key) for key in {**base, **own} if base.get(key) != own.get(key)}
+    if any(isinstance(value, list) and any(isinstance(v, dict) for v in value) for value in changed.values()):
+        return None  # a list of tables has no words on a command line
     return "".join(f" --set {key}={_written(value)}" for key, value in changed.items())
 
 

@@ -60,7 +60,8 @@ def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measur
 def _opening(first: Run, runs: Sequence[Run], verb: str) -> str:
     """What was run: the scenario's title, and the command where it is a shipped one."""
     title, settings = first.scenario.title, settings_of(first.record)
-    if settings is None or verb != "compare":
+    plain = all(run.record.repeat == 0 and run.target == first.target and not run.record.film_every for run in runs)
+    if settings is None or verb != "compare" or not plain:
         return title
     methods = ",".join(dict.fromkeys(run.method for run in runs))
     command = f"fluidbench compare {first.record.scenario} --solvers {methods}{settings}{first.target.options}"

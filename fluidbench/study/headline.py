@@ -44,11 +44,16 @@ def agreement(name: str, values: Mapping[str, float]) -> str:
     middle = mean(values[label] for label in together)
     said = f"{_listed(together)} agree on {title} within {_spread(together, values):.1%}"
     others = [
-        f"{label} is {abs(values[label] / middle - 1.0):.0%} {'above' if values[label] > middle else 'below'}"
+        f"{label} is {_off(values[label], middle)} {'above' if values[label] > middle else 'below'}"
         for label in ranked
         if label not in together
     ]
     return "; ".join([f"{said} ({number(factor * middle)} {unit})".replace(" )", ")"), *others]) + "."
+
+
+def _off(value: float, middle: float) -> str:
+    """A share of the middle; or the distance, where that is nothing."""
+    return f"{abs(value / middle - 1.0):.0%}" if middle else number(abs(value))
 
 
 def _spread(labels: Sequence[str], values: Mapping[str, float]) -> float:

@@ -15,7 +15,7 @@ from ..runs.experiment import CRASH, Experiment
 from ..runs.job import Job
 from ..runs.record import Run
 from ..scenario import Scenario
-from ..scenario.library import assign, validate
+from .points import varied
 from .result import Result
 from .sweep_report import report
 from .workplace import Options, Workplace, as_scenario, methods_of, require_number
@@ -39,6 +39,8 @@ class Point:
     measures: dict[str, float] = field(default_factory=dict)
     cost: dict[str, float] = field(default_factory=dict)
     together: int = 1
+    print: str = ""  # what became of one
+    warnings: list[str] = field(default_factory=list)
     run: Run | None = None  # where it ran alone
 
     @property
@@ -71,7 +73,7 @@ def sweep(
 
     `scenario` is one, a shipped name (`quick`: its shorter version) or a TOML file. `over`: values by dotted key, as
     {"material.yield_stress": [20, 65, 110]}, in SI units or with a unit; `methods` are names, default all. Points that
-    differ in their material, gravity, body force or seed alone run in the same launches, up to `worlds` at once:
+    differ in their material or body force alone (and little in wave speed) share launches, up to `worlds` at once:
     default 64 on a GPU, and 1 on a CPU, where that saves nothing. They advance by the smallest step that any of them
     needs. Where such a batch fails, its points run one by one. `options` are those of every verb, see Options.
 
@@ -84,13 +86,15 @@ def sweep(
     grid = points_of(resolved, over)
     points = [Point(settings, s, method) for method in names for settings, s in grid]
     most = worlds or (1 if place.target.device == "cpu" else MOST)
-    machine = run_shared(points, place, most)
+    machine, notes = run_shared(points, place, most)
     run_alone([p for p in points if not p.verdict], place)
     missing = lacking(points, refusals=False)
     ok = any(p.evidence is Evidence.RESULT for p in points) and not missing
     runs = [p.run for p in points if p.run is not None]
     root = place.store.root
-    return Sweep(report(resolved, list(over), points, machine, root), root, runs, missing, ok, place.keeper, points)
+    return Sweep(
+        report(resolved, list(over), points, machine, notes, root), root, runs, missing, ok, place.keeper, points
+    )
 
 
 def points_of(scenario: Scenario, over: Axes) -> list[tuple[dict[str, Any], Scenario]]:
@@ -106,23 +110,22 @@ def points_of(scenario: Scenario, over: Axes) -> list[tuple[dict[str, Any], Scen
     grid = list(itertools.islice(itertools.product(*over.values()), LARGEST + 1))
     if len(grid) > LARGEST:
         raise UserError(f"over: more than {LARGEST} points")
-    base, found = scenario.model_dump(mode="json", exclude_none=True), []
+    table, found = scenario.model_dump(mode="json"), []
     for values in grid:
         settings = dict(zip(over, values, strict=True))
-        changed = Scenario.model_validate(base).model_dump(mode="json", exclude_none=True)
-        if "nozzle.exit_speed" in settings:
-            changed["nozzle"].pop("flow_rate", None)
-        for key, value in settings.items():
-            assign(changed, key, value)
         where = ", ".join(f"{key} = {value}" for key, value in settings.items())
-        found.append((settings, validate(changed, f"{scenario.name} with {where}")))
+        try:
+            found.append((settings, varied(table, settings)))
+        except UserError as error:
+            raise UserError(f"{scenario.name} with {where}: {error}") from None
     return found
 
 
-def run_shared(points: Sequence[Point], place: Workplace, most: int) -> dict[str, str]:
-    """Run points that can share launches, and return on what; those of a batch that does not complete are left as they
-    were."""
+def run_shared(points: Sequence[Point], place: Workplace, most: int) -> tuple[dict[str, str], list[str]]:
+    """Run points that can share launches; returns on what, and which batches did not complete, whose points are left as
+    they were."""
     machine: dict[str, str] = {}
+    notes: list[str] = []
     several = 1 if place.target.device == "cpu" else PER_PROCESS
     chunks: list[list[list[Point]]] = []
     for method in dict.fromkeys(p.method for p in points):
@@ -133,19 +136,25 @@ def run_shared(points: Sequence[Point], place: Workplace, most: int) -> dict[str
     found = place.run([_experiment(chunk, place) for chunk in chunks], "batches", together=True) if chunks else []
     for chunk, ended in zip(chunks, found, strict=True):
         if CRASH in ended:
+            notes.append(f"{sum(map(len, chunk))} points of {chunk[0][0].method} ran alone: {ended[CRASH]}")
             continue
         machine = ended["machine"]
         for batch, told in zip(chunk, ended["batches"], strict=True):
             if told["verdict"] == Verdict.COMPLETED:
                 _tell(batch, told)
-    return machine
+            else:
+                notes.append(f"{len(batch)} points of {batch[0].method} ran alone: {told['verdict']}: {told['reason']}")
+    return machine, notes
 
 
 def _tell(batch: Sequence[Point], told: dict[str, Any]) -> None:
-    """Give the points of a batch what came of it."""
+    """Give the points of a batch what came of it; one that broke is left as it was."""
     for point, own in zip(batch, told["points"], strict=True):
+        if own["complaint"]:
+            continue
         point.verdict, point.measures = told["verdict"], own["measures"]
         point.cost, point.together = told["cost"], len(batch)
+        point.print, point.warnings = own["print"] or "", own["warnings"]
 
 
 def _experiment(chunk: Sequence[Sequence[Point]], place: Workplace) -> Experiment:
@@ -157,7 +166,8 @@ def _experiment(chunk: Sequence[Sequence[Point]], place: Workplace) -> Experimen
         "wall_limit": place.wall_limit,
     }
     function = f"{run_batches.__module__}:{run_batches.__name__}"
-    return Experiment(function, f"{first.scenario.name}-{first.method}-x{number}", first.method, task, place.target)
+    label, limit = f"{first.scenario.name}-{first.method}-x{number}", len(chunk) * place.wall_limit
+    return Experiment(function, label, first.method, task, place.target, limit)
 
 
 def run_alone(points: Sequence[Point], place: Workplace) -> None:
@@ -168,4 +178,5 @@ def run_alone(points: Sequence[Point], place: Workplace) -> None:
     for point, run in zip(points, place.run(planned, "points", together=True) if planned else [], strict=True):
         point.verdict, point.reason, point.run = run.verdict, run.reason, run
         point.measures = run.record.measures
+        point.print, point.warnings = run.record.print or "", list(run.record.warnings)
         point.cost = run.record.cost.model_dump(exclude_none=True) if run.record.cost is not None else {}

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..measure.tower import Print
 from ..report.plot import Plot, Trace, colour
 from ..report.report import Report, machine_of, record_link
 from ..report.table import Table, label, number, readable
@@ -21,8 +22,14 @@ MOST_ROWS = 60  # that the terminal shows
 
 
 def report(
-    scenario: Scenario, keys: Sequence[str], points: Sequence[Point], machine: Mapping[str, str], root: Path
+    scenario: Scenario,
+    keys: Sequence[str],
+    points: Sequence[Point],
+    machine: Mapping[str, str],
+    apart: Sequence[str],
+    root: Path,
 ) -> Report:
+    """`machine`: what batches ran on; `apart`: which of them did not complete."""
     import pandas as pd
 
     names = list(dict.fromkeys(name for p in points for name in lengths_in(p.measures)))
@@ -45,13 +52,16 @@ def report(
         [plot for name in names for plot in _multiples(name, keys, points)],
         {"Points that ran alone": [record_link(run, root, p.name) for p in points if (run := p.run)]} if runs else {},
         machine_of(runs) or "; ".join(f"{key} {value}" for key, value in machine.items()),
-        failures=[f"{p.name}: {p.verdict}: {p.reason}" for p in points if p.reason],
+        alarms=[f"{p.name}: the print: {p.print}" for p in points if p.print not in ("", Print.SOUND)],
+        failures=[*apart, *(f"{p.name}: {p.verdict}: {p.reason}" for p in points if p.reason)],
+        notes=[f"{p.name}: {line}" for p in points for line in p.warnings],
     )
 
 
 def _row(point: Point) -> dict[str, Any]:
     settings = {key: _plain(value) for key, value in point.settings.items()}
-    ended = {"method": point.method, "verdict": str(point.verdict), "reason": point.reason, "together": point.together}
+    ended = {"method": point.method, "verdict": str(point.verdict), "reason": point.reason}
+    ended |= {"print": str(point.print), "together": point.together}
     return settings | ended | point.measures | point.cost
 
 

@@ -96,7 +96,8 @@ def test_claims_of_prohibitive_steps_and_of_the_highest_cost():
     assert found[cost].brief == "x 10 mpm's, x 2.5 pbd's" and len(found[cost].runs) == 6
     found = told(mpm=1.0, sph=9.99, pbd=9.0)
     assert (found[steps].verdict, found[cost].verdict) == (REFUTED, REFUTED)
-    assert cost not in told(mpm=1.0, sph=9.0) and steps not in told(sph=1.0, pbd=9.0)
+    for missing in (told(mpm=1.0, sph=9.0)[cost], told(sph=1.0, pbd=9.0)[steps]):
+        assert (missing.verdict, missing.brief) == (OPEN, "not every method has a result")
 
 
 def answers(names, method, good):
@@ -212,3 +213,14 @@ def test_pressed_strands_have_a_reference_of_their_own():
     assert bead_width(evidence([], repeats=level, second=level)).verdict == REFUTED
     lost = trial(case(STRANDS), "pbd", verdict="timeout")
     assert bead_width(evidence([lost], repeats=level, second=level)).verdict == OPEN
+
+
+def test_what_has_no_width_or_area_decides_nothing():
+    level = widths(0.010, 0.010, 0.0102)
+    strands = trial(case(STRANDS), "pbd", 9.0, verdict="exempt")
+    strands.finding = Finding(9.0, (Number("width over D at a gap of 1 D", math.nan, 1.0),))
+    assert bead_width(evidence([strands], repeats=level, second=level)).verdict == OPEN
+    blown = trial(case(STRANDS), "pbd", verdict="diverged")
+    assert bead_width(evidence([blown], repeats=level, second=level)).verdict == OPEN
+    bare = grids(_1=(math.nan, math.nan), _2=(0.5, 0.5), _3=(0.0, 0.0))
+    assert grid_artifacts(evidence(grids=bare)).verdict == OPEN

@@ -202,7 +202,7 @@ def test_the_winner_is_the_cheapest_of_those_within_tolerance():
     assert winners(rows, ["liquid"]) == {"sph": 1, "mpm": 1}
     again = case("d", "liquid", 0.1)
     assert winners([*rows, trial(again, "sph")], ["liquid"]) == {"sph": 2, "mpm": 1}
-    assert winners(rows, ["elastic"]) == {"pbd": 1} and winners([trial(LIQUID, "mpm", 0.2)], ["liquid"]) == {}
+    assert winners(rows, ["elastic"]) == {"pbd": 1} and winners([trial(LIQUID, "mpm", 0.2)], ["liquid"]) == {"none": 1}
     law = case("e", "liquid", 0.1, drive=lambda dt: None)
     assert winners([trial(law, "mpm")], ["liquid"]) == {}
 

@@ -81,7 +81,7 @@ def test_points_are_every_combination_the_last_key_fastest():
         ({STRESS: 20.0}, "a list of values"),
         ({STRESS: [20.0, 20.0]}, "named twice"),
         ({"material.yeld_stress": [1.0, 2.0]}, "did you mean 'yield_stress'"),
-        ({STRESS: [20.0, -1.0]}, "material.yield_stress = -1.0: material.yield_stress"),
+        ({STRESS: [20.0, -1.0]}, "material.yield_stress = -1.0: line_bead: material.yield_stress"),
         ({STRESS: list(range(200)), "spacing": [1e-3 * (i + 1) for i in range(51)]}, "more than 10000"),
     ],
 )
@@ -99,12 +99,36 @@ def test_points_that_differ_in_material_alone_share_launches():
     assert shared(MPM, resting, Target(), 64) == [[i] for i in range(6)]
 
 
+@pytest.mark.parametrize(
+    "over",
+    [
+        {"seed": [1, 2]},  # a session lays all worlds out by the first one's
+        {"material.youngs_modulus": [1e3, 1e7]},  # and judges all by the fastest waves
+        {"gravity": [[0.0, 0.0, -9.81], [0.0, 0.0, -981.0]]},
+        {"nozzle.exit_speed": [0.05, 0.1]},
+    ],
+)
+def test_points_do_not_share_what_a_session_has_once(over):
+    scenarios = [s for _, s in points_of(BEAD, over)]
+    assert shared(MPM, scenarios, Target(), 64) == [[0], [1]]
+
+
+def test_a_point_that_is_refused_stands_alone():
+    scenarios = [s for _, s in points_of(BEAD, {STRESS: [20.0, 1e9, 60.0]})]  # a solid is fed in
+    assert shared(get_method("pbd"), scenarios, Target(), 64) == [[0, 2], [1]]
+
+
+def test_keys_of_a_nozzle_need_one():
+    with pytest.raises(UserError, match="the scenario has no nozzle"):
+        points_of(fb.load("dam_break"), {SPEED: [0.1, 0.2]})
+
+
 def test_points_that_a_method_runs_by_other_schemes_do_not_share():
     scenarios = [s for _, s in points_of(BEAD, {"material.viscosity": [1.0, 1e4, 2.0]})]
     assert shared(get_method("sph"), scenarios, Target(), 64) == [[0, 2], [1]]
 
 
-def batches(verdict="completed"):
+def batches(verdict="completed", broken=None):
     """Answers of batches that ended so: a width of as many metres as the yield stress has pascals."""
 
     def answer(work):
@@ -118,7 +142,15 @@ def batches(verdict="completed"):
                 "verdict": verdict,
                 "reason": "",
                 "cost": {"wall_s": 4.0},
-                "points": [{"measures": {"bead_width_m": s["material"]["yield_stress"]}} for s in batch],
+                "points": [
+                    {
+                        "measures": {"bead_width_m": s["material"]["yield_stress"]},
+                        "complaint": "it flew" if s["material"]["yield_stress"] == broken else None,
+                        "print": "collapsed",
+                        "warnings": ["odd"],
+                    }
+                    for s in batch
+                ],
             }
             for batch in work.task["batches"]
         ]
@@ -127,8 +159,8 @@ def batches(verdict="completed"):
     return answer
 
 
-def run_sweep(monkeypatch, tmp_path, verdict, **more):
-    calls = working(monkeypatch, batches(verdict))
+def run_sweep(monkeypatch, tmp_path, verdict, broken=None, **more):
+    calls = working(monkeypatch, batches(verdict, broken))
     over = {STRESS: [20.0, 60.0], SPEED: [0.05, 0.1]}
     return fb.sweep("line_bead", over, ["mpm"], out=tmp_path, progress=False, **more), calls
 
@@ -146,6 +178,13 @@ def test_points_of_a_batch_that_failed_run_alone(monkeypatch, tmp_path, verdict)
     found, calls = run_sweep(monkeypatch, tmp_path, verdict, worlds=8)
     assert [len(call) for call in calls] == [2, 4]
     assert found.table.bead_width_m.tolist() == [20.0, 20.0, 60.0, 60.0] and found.table.together.tolist() == [1] * 4
+    assert found.report.failures and all("points of mpm ran alone" in line for line in found.report.failures)
+
+
+def test_a_world_that_broke_by_its_own_scenario_runs_alone(monkeypatch, tmp_path):
+    found, calls = run_sweep(monkeypatch, tmp_path, "completed", broken=60.0, worlds=8)
+    assert [len(call) for call in calls] == [2, 2] and found.table.together.tolist() == [2, 2, 1, 1]
+    assert found.report.alarms[0].endswith("the print: collapsed") and found.report.notes[0].endswith(": odd")
 
 
 def test_on_a_processor_nothing_is_shared_unless_asked(monkeypatch, tmp_path):
@@ -172,7 +211,7 @@ def test_lengths_are_small_multiples_over_the_first_key(tmp_path):
             made = Point({STRESS: stress, SPEED: speed}, BEAD, method, "completed", together=4)
             made.measures, made.cost = {"bead_width_m": 1e-3 * stress, "top_m": 1.0}, {"wall_s": 2.0}
             points.append(made)
-    made = report(BEAD, [STRESS, SPEED], points, {"device": "x"}, tmp_path)
+    made = report(BEAD, [STRESS, SPEED], points, {"device": "x"}, [], tmp_path)
     assert [plot.title for plot in made.plots] == [
         "bead width [mm], exit_speed = 0.05",
         "bead width [mm], exit_speed = 0.1",

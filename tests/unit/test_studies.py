@@ -116,10 +116,11 @@ def trial(case, method, error, wall, spacing=1.0):
 
 
 def test_cost_at_equal_error_follows_the_power_laws():
-    """Errors h and 4 h at the same cost h^-4: at equal error the second costs 4^4 times as much."""
+    """Errors h and 4 h at the same cost h^-4: at the second's best, 2, it costs 16 times what the first's cheapest run
+    does, which is better than that."""
     trials = [trial("elliptic_drop", m, k * h, h**-4, h) for m, k in (("mpm", 1.0), ("sph", 4.0)) for h in (1.0, 0.5)]
     costs = at_equal_error(trials)
-    assert costs["sph"] / costs["mpm"] == pytest.approx(256.0)
+    assert costs["sph"] / costs["mpm"] == pytest.approx(16.0)
 
 
 def test_a_method_whose_error_does_not_fall_counts_with_its_cheapest_run():
