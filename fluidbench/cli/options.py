@@ -89,7 +89,10 @@ MeasuredFile = Annotated[
     ),
 ]
 Seed = Annotated[
-    int, typer.Option(min=0, help="shift what bodies begin with at random, by up to a twentieth of a spacing; 0: not")
+    int,
+    typer.Option(
+        min=0, max=2**32 - 1, help="shift what bodies begin with at random, by up to a twentieth of a spacing; 0: not"
+    ),
 ]
 Shorter = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter and coarser version")]
 Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]

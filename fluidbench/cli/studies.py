@@ -42,7 +42,9 @@ def sweep(
     solvers: Solvers = None,
     worlds: Annotated[
         int | None,
-        typer.Option(min=1, help="points in one launch, where they can share one; default 64 on a GPU, 1 on a CPU"),
+        typer.Option(
+            min=1, max=10_000, help="points in one launch, where they can share one; default 64 on a GPU, 1 on a CPU"
+        ),
     ] = None,
     set_: Settings = None,
     spacing: Spacing = None,

@@ -106,7 +106,7 @@ def archives(folder: Path) -> dict[str, Evidence]:
     try:
         places = [folder] if (folder / INDEX).exists() else sorted(path.parent for path in folder.glob(f"*/{INDEX}"))
     except (OSError, ValueError) as error:
-        raise UserError(f"{quoted(str(folder))[1:-1]}: {error}") from None
+        raise UserError(f"{quoted(str(folder))[1:-1]}: {getattr(error, 'strerror', None) or error}") from None
     if not places:
         raise UserError(
             f"{quoted(str(folder))[1:-1]}: no {INDEX}, here or one folder down: give one that `fluidbench table1` wrote"

@@ -13,7 +13,7 @@ from ..report.report import write
 from ..scenario import Scenario
 from ..study.case import Case
 from ..study.result import Result
-from ..study.trials import Trial, plan, run, shaken
+from ..study.trials import LAST_SEED, Trial, plan, run, shaken
 from ..study.workplace import Options, Workplace, as_scenario, require_number
 from .archive import archives, keep
 from .definitions import COST_CASES, METHODS
@@ -63,7 +63,7 @@ def table1(
 
     Raises UserError for what cannot be run, before anything is.
     """
-    require_number(seed, "seed", 0, whole=True)
+    require_number(seed, "seed", 0, whole=True, high=LAST_SEED)
     resolved = shaken(as_scenario(scenario), seed)
     if quick and not isinstance(scenario, Scenario):
         resolved = resolved.replace(spacing=coarser(resolved))

@@ -81,7 +81,7 @@ def sweep(
     """
     resolved, names = as_scenario(scenario, quick), methods_of(methods, options)
     if worlds is not None:
-        require_number(worlds, "worlds", 1, whole=True)
+        require_number(worlds, "worlds", 1, whole=True, high=LARGEST)
     place = Workplace.of(options, WALL_LIMIT, names)
     grid = points_of(resolved, over)
     points = [Point(settings, s, method) for method in names for settings, s in grid]
@@ -113,11 +113,11 @@ def points_of(scenario: Scenario, over: Axes) -> list[tuple[dict[str, Any], Scen
     table, found = scenario.model_dump(mode="json"), []
     for values in grid:
         settings = dict(zip(over, values, strict=True))
-        where = ", ".join(f"{key} = {value}" for key, value in settings.items())
+        where = ", ".join(f"{quoted(key)[1:-1]} = {quoted(value)}" for key, value in settings.items())
         try:
             found.append((settings, varied(table, settings)))
         except UserError as error:
-            raise UserError(f"{scenario.name} with {where}: {error}") from None
+            raise UserError(f"over: {where}: {error}") from None
     return found
 
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 LEVELS = {"rough": 1.5, "coarse": 1.0, "medium": 1 / 1.5, "fine": 0.5}  # factors on a case's coarse spacing
 
 SHAKE = 0.05  # of a spacing
+LAST_SEED = 2**32 - 1
 
 PASS, MISS, EXEMPT, SKIPPED = "pass", "MISS", "exempt", "skipped"
 

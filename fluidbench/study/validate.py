@@ -11,7 +11,7 @@ from ..errors import UserError
 from ..method.verdict import lacking
 from .case import Case, select
 from .result import Result
-from .trials import Trial, plan, run
+from .trials import LAST_SEED, Trial, plan, run
 from .validate_report import report
 from .workplace import Options, Workplace, methods_of, names_of, require_number
 
@@ -44,7 +44,7 @@ def validate(
     Raises UserError for what is not known, before anything is run.
     """
     names = methods_of(methods, options)
-    require_number(seed, "seed", 0, whole=True)
+    require_number(seed, "seed", 0, whole=True, high=LAST_SEED)
     place = Workplace.of(options, WALL_LIMIT, names)
     cases, levels = names_of(cases, "cases"), names_of(levels, "levels") or ()
     if not levels:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
+import sys
 import tempfile
 import weakref
 from collections.abc import Iterable, Sequence
@@ -160,12 +160,13 @@ def names_of(given: Any, what: str) -> list[Any] | None:
     return found
 
 
-def require_number(value: Any, what: str, low: float, whole: bool = False) -> None:
-    """Raise UserError unless a value is a finite number of at least `low` (whole, where it counts something)."""
+def require_number(value: Any, what: str, low: float, whole: bool = False, high: float = sys.float_info.max) -> None:
+    """Raise UserError unless a value is a number from `low` to `high` (whole, where it counts something)."""
     kinds = int if whole else int | float
-    if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value < math.inf:
+    if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
         kind = "whole number" if whole else "number"
-        raise UserError(f"{what}: a {kind} of at least {low:g} is wanted (got {quoted(value)})")
+        most = f" and at most {high:.10g}" if high < sys.float_info.max else ""
+        raise UserError(f"{what}: a {kind} of at least {low:g}{most} is wanted (got {quoted(value)})")
 
 
 def methods_of(

@@ -11,6 +11,7 @@ from .toml import dump
 BARE: dict[str, tuple[str, ...]] = {
     "compare": ("compare", "line_bead"),
     "run": ("run", "line_bead"),
+    "sweep": ("sweep", "line_bead", "--over", "material.yield_stress=20,50"),
     "validate": ("validate", "free_fall"),
     "stability": ("stability",),
     "bench": ("bench", "--quick", "--solvers", "mpm"),
@@ -27,7 +28,11 @@ BARE: dict[str, tuple[str, ...]] = {
 WITHOUT_OUT = ("show", "render", "list", "doctor", "init")
 STUDIES = tuple(verb for verb in BARE if verb not in WITHOUT_OUT)
 HAS = {
-    "--solvers": ("compare", "validate", "stability", "bench", "ablate", "select", "table2"),
+    "--solvers": ("compare", "sweep", "validate", "stability", "bench", "ablate", "select", "table2"),
+    "--over": ("sweep",),
+    "--worlds": ("sweep",),
+    "--from": ("table1",),
+    "--seed": ("validate", "table1"),
     "--particles": ("bench",),
     "--axis": ("stability",),
     "--levels": ("validate",),
@@ -35,7 +40,7 @@ HAS = {
     "--backend": STUDIES,
     "--device": STUDIES,
     "--threads": STUDIES,
-    "--spacing": ("compare", "run", "stability", "ablate", "select", "table1", "show"),
+    "--spacing": ("compare", "run", "sweep", "stability", "ablate", "select", "table1", "show"),
     "--out": STUDIES,
     "--wall-limit": STUDIES,
     "--render-every": ("compare", "run"),
@@ -48,7 +53,7 @@ HAS = {
     "--solver": ("run",),
     "--checkpoint-every": ("compare", "run"),
     "--measured": ("compare", "run", "select"),
-    "--set": ("compare", "run", "stability", "ablate", "select", "table1", "show"),
+    "--set": ("compare", "run", "sweep", "stability", "ablate", "select", "table1", "show"),
 }
 """Option with a value -> verbs; a test holds it against the application."""
 LISTS = {
@@ -68,6 +73,41 @@ LISTS = {
         "nan",
         "1e300",
     ),
+    "--over": (
+        "",
+        "=",
+        "=1,2",
+        "material.yield_stress",
+        "material.yield_stress=",
+        "material.yield_stress=,",
+        "material.yield_stress=20:200",
+        "material.yield_stress=20:200:5:log:7",
+        "material.yield_stress=20:200:1",
+        "material.yield_stress=20:200:-5",
+        "material.yield_stress=20:200:1.5",
+        "material.yield_stress=20:200:1e3",
+        "material.yield_stress=20:200:" + "9" * 5000,
+        "material.yield_stress=0:200:5:log",
+        "material.yield_stress=nan:200:5",
+        "material.yield_stress=20:inf:5",
+        "material.yield_stress=20,nan",
+        "material.yield_stress=20,1e300",
+        "material.yield_stress=20,20",
+        "material.yield_stress=20,20.0",
+        "material.yield_stress=50,80",
+        "material.yeild_stress=20,50",
+        "material.youngs_modulus=20:1e300:3:log",
+        "nozzle.exit_speed=1e-300:1e300:5:log",
+        "spacing=1e-12,1e-9",
+        "spacing=1:2:10000",
+        "material=1,2",
+        "\x00=1,2",
+        "\x1b[31m=1,2",
+        "x" * 5000 + "=1,2",
+        "numerics.mpm=1,2",
+        "domain.lower=1,2",
+    ),
+    "--from": ("missing", "", ".", "/dev/null", "file", "x" * 5000, "a\x00b", "\udcff", "名前"),
     "--axis": (",", " ,, ", "density,density", "viscocity", "density;spacing", "x" * 5000, "nan", "Density"),
     "--levels": (",", "", " ", "coarse,coarse", "corse", "coarse;fine", "1.5", "nan", "x" * 5000),
     "--pools": (
@@ -170,6 +210,8 @@ VALUES = {
     "--repeats": WHOLES,
     "--threads": WHOLES,
     "--jobs": WHOLES,
+    "--worlds": WHOLES,
+    "--seed": [v for v in WHOLES if v != "0"],
     "--tolerance": (
         "5",
         "1.5",
@@ -219,6 +261,8 @@ MAY = {
     "--wall-limit": ("0", "1_000", "１"),
     "--threads": ("1",),
     "--jobs": ("1_0",),
+    "--worlds": ("1", "1_0"),
+    "--seed": ("0", "1_0"),
     "--tolerance": ("500%", "1", "٥%"),
     "--budget": ("", "none", " 60s ", "٥s"),
     "--pools": ("٣٠٠٠٠٠", "5"),
@@ -242,7 +286,20 @@ def command(verb: str, *rest: str) -> tuple[str, ...]:
 def lists(rng: random.Random) -> Iterator[Case]:
     for option, values in LISTS.items():
         for verb, value in itertools.product(HAS[option], values):
-            told = (option, "solver", "axis", "level", "backend", "device", "colour", "no run here", "--executor")
+            told = (
+                option,
+                "over",
+                "evidence.json",
+                "xxx",
+                "solver",
+                "axis",
+                "level",
+                "backend",
+                "device",
+                "colour",
+                "no run here",
+                "--executor",
+            )
             yield Case("lists and names of options", command(verb, f"{option}={value}"), names=told)
     for verb in HAS["--backend"]:
         if verb != "compare":
@@ -484,6 +541,7 @@ def legitimate(rng: random.Random) -> Iterator[Case]:
     right += [command("ablate", "--tolerance", v) for v in ("5%", "5 %", "0.05", "0.9", "100%", "0.1%", " 5% ")]
     right += [command("select", "--budget", v) for v in ("60s", "realtime", "5m", "1h", "0.5s", "90")]
     right += [command("compare", "--solvers", v) for v in ("mpm", "sph,mpm", " mpm , pbd ")]
+    right += [command("sweep", "--worlds", "4"), command("validate", "--seed", "4294967295")]
     right += [command("validate", "--levels", v) for v in ("rough,coarse", "fine")]
     right += [command("stability", "--axis", v, "--quick") for v in ("density", "viscosity,spacing")]
     right += [command("table2", "--pools", v) for v in ("fit", "298000", "298000,fit")]
