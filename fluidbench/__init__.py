@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .study.bench import bench
     from .study.case import Case, Curve, Finding, Number
     from .study.compare import compare, run
+    from .study.guide import guide
     from .study.select import select
     from .study.stability import stability
     from .study.sweep import sweep
@@ -39,6 +40,7 @@ __all__ = [
     "compare",
     "define",
     "fill",
+    "guide",
     "load",
     "run",
     "select",
@@ -66,6 +68,7 @@ _ROOMS = {
     "bench": "study.bench",
     "ablate": "study.ablate",
     "select": "study.select",
+    "guide": "study.guide",
     "table1": "paper.table1",
     "table2": "paper.table2",
 }

@@ -94,6 +94,14 @@ Seed = Annotated[
         min=0, max=2**32 - 1, help="shift what bodies begin with at random, by up to a twentieth of a spacing; 0: not"
     ),
 ]
+From = Annotated[
+    Path | None,
+    typer.Option(
+        "--from",
+        help="run nothing: judge again what studies have kept in this folder, or in folders inside it",
+        show_default=False,
+    ),
+]
 Shorter = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter and coarser version")]
 Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
 

@@ -1,12 +1,12 @@
-"""sweep, stability, bench, ablate, select, table1 and table2: studies made of many runs."""
+"""sweep, stability, bench, ablate, select, guide, table1 and table2: studies made of many runs."""
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from .app import app, finish
 from .options import (
+    From,
     MeasuredFile,
     Quick,
     ScenarioName,
@@ -150,6 +150,7 @@ def select(
     set_: Settings = None,
     spacing: Spacing = None,
     measured: MeasuredFile = None,
+    quick: Shorter = False,
     *,
     options: Any,
 ) -> None:
@@ -159,7 +160,7 @@ def select(
     """
     from ..study.select import select as study
 
-    resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
+    resolved, share = load_scenario(scenario, set_, spacing, quick), fraction(tolerance)
     longest, pace = budget_of(budget)
     more = placed(options, f"select-{resolved.name}")
     chosen = study(
@@ -176,17 +177,40 @@ def select(
 
 
 @app.command()
+@running(wall_limit=900.0)
+def guide(
+    scenarios: Annotated[
+        list[str] | None, typer.Argument(help="scenarios, by name or as TOML files; default one for each job")
+    ] = None,
+    from_: From = None,
+    tolerance: Annotated[str, typer.Option(help="largest relative errors of any length, separated by commas")] = (
+        "2%,5%,10%"
+    ),
+    solvers: Solvers = None,
+    quick: Shorter = False,
+    *,
+    options: Any,
+) -> None:
+    """Which method for what: the cheapest method and spacing for each job and tolerance, on this machine, as one chart.
+
+    What `select` does, for paste, concrete, foam, honey and water, or for the scenarios named: hours on a CPU.
+    """
+    from ..study.guide import guide as study
+    from ..study.guide import published
+
+    shares = [fraction(text) for text in names_in(tolerance, "--tolerance", "tolerance")]
+    more = placed(options, "guide")
+    if from_ is not None:
+        finish(published(from_, shares, more.get("out")))
+        return
+    finish(study(scenarios or None, methods_in(solvers), tolerances=shares, quick=quick, **more))
+
+
+@app.command()
 @running(wall_limit=3600.0)
 def table1(
     scenario: ScenarioName = "line_bead",
-    from_: Annotated[
-        Path | None,
-        typer.Option(
-            "--from",
-            help="run nothing: judge again what studies have kept in this folder, or in folders inside it",
-            show_default=False,
-        ),
-    ] = None,
+    from_: From = None,
     repeats: Annotated[int, typer.Option(min=2, help="runs of each method on the scenario, for the spread")] = 3,
     set_: Settings = None,
     spacing: Spacing = None,

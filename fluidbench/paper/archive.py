@@ -1,9 +1,7 @@
-"""The evidence of a study without its particles: an index of what every run was made for, and the runs' records; enough
-to judge the table again, elsewhere and later."""
+"""The evidence of a study, kept without its particles, see runs/archive.py; enough to judge the table again."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,27 +9,21 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..errors import UserError, quoted
-from ..files import write_parquet
-from ..runs.record import Record, Run
-from ..runs.store import read_record, write_record
+from ..errors import UserError
+from ..runs import archive
+from ..runs.record import Run
 from ..scenario import Scenario
 from ..study.case import Finding, Number, cases
 from ..study.trials import Trial
 from .evidence import GROUPS, Evidence
 
-INDEX, RECORDS = "evidence.json", "records.parquet"
+NAME = "evidence"
 TRIALS = ("trials", "other_trials")
 OWN = ("method", "level", "spacing", "verdict", "note")  # of a trial
 
 
 def keep(e: Evidence, folder: Path) -> None:
-    """Write index and records into a folder; the index is sealed, and so are the records by it."""
-    import pandas as pd
-
-    records = {run.folder.name: json.dumps(run.record.model_dump(mode="python")) for run in e.runs()}
-    table = pd.DataFrame({"run": list(records), "record": list(records.values())})
-    write_parquet(folder / RECORDS, table)
+    """Write it into a folder."""
     index = {
         "scenario": e.scenario.model_dump(mode="json"),
         "seed": e.seed,
@@ -41,7 +33,7 @@ def keep(e: Evidence, folder: Path) -> None:
         "limits": e.limits,
         **{name: [_told(t) for t in getattr(e, name)] for name in TRIALS},
     }
-    write_record(folder, index, [folder / RECORDS], INDEX)
+    archive.keep(folder, NAME, index, e.runs())
 
 
 def _told(t: Trial) -> dict[str, Any]:
@@ -63,18 +55,8 @@ def _plain(n: Number) -> dict[str, Any]:
 
 def restore(folder: Path) -> Evidence:
     """The evidence that a folder holds; its runs have records alone. Raises UserError where it is not whole."""
-    import pandas as pd
-
-    index, why = read_record(folder, INDEX)
-    where = quoted(str(folder))[1:-1]
-    if index is None:
-        raise UserError(f"{where}: {why or f'no {INDEX} here: give a folder that `fluidbench table1` wrote'}")
+    index, runs = archive.restore(folder, NAME)
     try:
-        table = pd.read_parquet(folder / RECORDS)
-        records = {
-            name: Record.model_validate(json.loads(text)) for name, text in zip(table.run, table.record, strict=True)
-        }
-        runs = {name: Run(record, folder / "runs" / name) for name, record in records.items()}
         trials, other = ([_trial(t, runs) for t in index[name]] for name in TRIALS)
         e = Evidence(Scenario.model_validate(index["scenario"]), trials, {}, limits=index["limits"])
         e.other_trials, e.seed = other, index["seed"]
@@ -82,7 +64,7 @@ def restore(folder: Path) -> Evidence:
             e.take(name, {key: _pick(runs, names) for key, names in index["groups"][name]})
         return e
     except (KeyError, TypeError, ValidationError) as error:
-        raise UserError(f"{where}: of another edition of fluidbench ({type(error).__name__}: {error})") from None
+        raise UserError(archive.another_edition(folder, error)) from None
 
 
 def _pick(runs: dict[str, Run], names: Iterable[str]) -> list[Run]:
@@ -103,20 +85,12 @@ def _trial(told: dict[str, Any], runs: dict[str, Run]) -> Trial:
 def archives(folder: Path) -> dict[str, Evidence]:
     """Every study that a folder holds, itself or in folders of its own, by what sets it apart. Raises UserError for
     none, and for one that is not whole."""
-    try:
-        places = [folder] if (folder / INDEX).exists() else sorted(path.parent for path in folder.glob(f"*/{INDEX}"))
-    except (OSError, ValueError) as error:
-        raise UserError(f"{quoted(str(folder))[1:-1]}: {getattr(error, 'strerror', None) or error}") from None
-    if not places:
-        raise UserError(
-            f"{quoted(str(folder))[1:-1]}: no {INDEX}, here or one folder down: give one that `fluidbench table1` wrote"
-        )
     found: dict[str, Evidence] = {}
-    for place in places:
+    for place in archive.places(folder, NAME, "table1"):
         e = restore(place)
         found[e.label if e.label not in found else f"{e.label}, {place.name}"] = e
     if len({_subject(e) for e in found.values()}) > 1:
-        raise UserError(f"{quoted(str(folder))[1:-1]}: studies of different scenarios are not put side by side")
+        raise UserError(f"{archive.shown(folder)}: studies of different scenarios are not put side by side")
     return found
 
 

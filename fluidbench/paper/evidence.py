@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..measure.reference import table as reference
-from ..method.target import DEFAULT_BACKEND, Target
+from ..method.target import Target
 from ..method.verdict import lacking
 from ..registry import get_method
+from ..runs.archive import where
 from ..runs.job import Job
 from ..runs.record import Run
 from ..scenario import Scenario
@@ -75,10 +76,8 @@ class Evidence:
     @property
     def label(self) -> str:
         """What sets it apart from another study: the device, and the seed where one was given."""
-        machines = (run.record.machine for runs in self.repeats.values() for run in runs)
-        device = next((machine["device"] for machine in machines if "device" in machine), "CPU")
-        backend = next((run.record.backend for runs in self.repeats.values() for run in runs), DEFAULT_BACKEND)
-        return device + f", {backend}" * (backend != DEFAULT_BACKEND) + f", seed {self.seed}" * (self.seed > 0)
+        runs = (run for runs in self.repeats.values() for run in runs)
+        return where(runs) + f", seed {self.seed}" * (self.seed > 0)
 
     def group(self, name: str) -> Runs:
         """One of GROUPS."""

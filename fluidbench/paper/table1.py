@@ -9,7 +9,6 @@ from typing import Unpack
 
 from ..errors import UserError
 from ..method.target import Target
-from ..report.report import write
 from ..scenario import Scenario
 from ..study.case import Case
 from ..study.result import Result
@@ -29,21 +28,9 @@ class Table1(Result):
 
     studies: dict[str, Evidence] = field(default_factory=dict)
 
-    def save(self, folder: str | Path | None = None) -> Path:
-        """As every result, and what `published` reads: the evidence without its particles."""
-        page = super().save(folder)
+    def keep(self, folder: Path) -> None:
         for e in self.studies.values():
-            keep(e, page.parent)
-        return page
-
-
-@dataclass(repr=False)
-class Published(Table1):
-    """The same from studies that were kept; the runs' own folders are elsewhere."""
-
-    def save(self, folder: str | Path | None = None) -> Path:
-        """Write tables and page."""
-        return write(self.report, self.root if folder is None else Path(folder), pictures=False)
+            keep(e, folder)
 
 
 def table1(
@@ -84,7 +71,7 @@ def table1(
     return Table1(report(studies, root), root, e.runs(), missing, not missing, place.keeper, studies)
 
 
-def published(folder: str | Path, out: str | Path | None = None) -> Published:
+def published(folder: str | Path, out: str | Path | None = None) -> Table1:
     """Judge the table again from what studies have kept in a `folder`, or in folders inside it: nothing is run. Where
     they disagree, a cell says so.
 
@@ -94,7 +81,7 @@ def published(folder: str | Path, out: str | Path | None = None) -> Published:
     root = Path(folder if out is None else out).expanduser().absolute()
     runs = [found for e in studies.values() for found in e.runs()]
     missing = [f"{label}: {line}" for label, e in studies.items() for line in e.missing()]
-    return Published(report(studies, root), root, runs, missing, not missing, studies=studies)
+    return Table1(report(studies, root), root, runs, missing, not missing, kept=True, studies=studies)
 
 
 def coarser(scenario: Scenario) -> float:

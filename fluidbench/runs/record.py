@@ -5,6 +5,7 @@ JSON (`record.json`) and a row of a table (`Record.row`) are the record's two fa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -102,6 +103,14 @@ class Record(BaseModel):
     def binding(self) -> str:
         """The bound that held the step back for most of the simulated time."""
         return max(self.binding_s, key=self.binding_s.__getitem__) if self.binding_s else ""
+
+    @property
+    def seconds(self) -> float:
+        """What its loop took [s]: CPU time on one core, which other work on the machine leaves as it is; wall time on
+        several and on a GPU. NaN where it was not run."""
+        if self.cost is None:
+            return math.nan
+        return self.cost.cpu_s if self.device == "cpu" and self.threads == 1 else self.cost.wall_s
 
     def row(self) -> dict[str, Any]:
         """The record as a row of a table."""

@@ -6,8 +6,16 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from ..runs.record import Record
+from ..runs.record import Record, Run
 from ..scenario.library import load, shipped
+
+
+def command_of(run: Run) -> str | None:
+    """The command for a run of a shipped scenario, varied; None for any other."""
+    settings = settings_of(run.record)
+    if settings is None:
+        return None
+    return f"fluidbench run {run.record.scenario} --solver {run.method}{settings}{run.target.alone}"
 
 
 def settings_of(record: Record) -> str | None:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 class Result:
     """A study that has ended.
 
-    `missing` names what it needed and has nothing of, one line each; `ok` is whether it says what it was asked for.
+    `missing` names what it needed and has nothing of, one line each; `ok` is whether it says what it was asked for;
+    `kept`: it was concluded from records that were kept, and the runs' own folders are elsewhere.
     """
 
     report: Report
@@ -30,6 +31,7 @@ class Result:
     missing: list[str] = field(default_factory=list)
     ok: bool = True
     keeper: Any = None  # keeps the folder of the runs as long as this is held
+    kept: bool = field(default=False, kw_only=True)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -53,12 +55,17 @@ class Result:
         elsewhere; returns the page's path."""
         target = self.root if folder is None else Store(Path(folder).expanduser().absolute()).root
         try:
-            if target.resolve() != self.root.resolve():
+            if not self.kept and target.resolve() != self.root.resolve():
                 for run in self.runs:
                     shutil.copytree(run.folder, target / run.folder.relative_to(self.root), dirs_exist_ok=True)
         except (OSError, shutil.Error) as error:
             raise Obstacle(f"cannot copy the runs to {target}: {getattr(error, 'strerror', None) or error}") from None
-        return write(self.report, target)
+        if not self.kept:
+            self.keep(target)
+        return write(self.report, target, pictures=not self.kept)
+
+    def keep(self, folder: Path) -> None:
+        """Write what is needed to conclude again without the particles, where the verb can."""
 
     def show(self, console: Console | None = None) -> None:
         """Print tables and findings."""

@@ -13,7 +13,7 @@ from ..scenario import Scenario
 from ..scenario.measured import Measured
 from .result import Result
 from .select_report import report
-from .selection import FACTORS, Selection, assess
+from .selection import FACTORS, FINEST, Selection, assess
 from .workplace import Options, Workplace, as_scenario, measured_of, methods_of, require_number
 
 WALL_LIMIT = 900.0  # s
@@ -40,10 +40,10 @@ def select(
     """Recommend a method, spacing and time step: least cost within a `tolerance` (largest relative error of any
     length), within a `budget` of wall time [s] and a `pace` (wall s per simulated s), on this machine.
 
-    Runs every method at four spacings. `scenario` is one, a shipped name or a TOML file; `methods` are names, default
-    all. `called` is the scenario's name in the command that it recommends. `measured`: a table of what was measured on
-    a real print (CSV), which errors are then counted from, beside what the scenario has of it. `options` are those of
-    every verb, see Options.
+    Runs every method at four spacings, on a GPU at five. `scenario` is one, a shipped name or a TOML file; `methods`
+    are names, default all. `called` is the scenario's name in the command that it recommends. `measured`: a table of
+    what was measured on a real print (CSV), which errors are then counted from, beside what the scenario has of it.
+    `options` are those of every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is.
     """
@@ -60,7 +60,8 @@ def select(
 
 def candidates(scenario: Scenario, methods: Sequence[str], place: Workplace) -> list[Job]:
     """Every method at every spacing that the scenario can have."""
-    tables = [scenario.model_dump(mode="json") | {"spacing": factor * scenario.spacing} for factor in FACTORS]
+    factors = FACTORS if place.target.device == "cpu" else (*FACTORS, FINEST)
+    tables = [scenario.model_dump(mode="json") | {"spacing": factor * scenario.spacing} for factor in factors]
     return [
         Job(table, method, place.target, wall_limit=place.wall_limit)
         for method in methods

@@ -38,14 +38,14 @@ def report(
 
 def _budget(budget: float, pace: float) -> str:
     parts = [f"{budget:g} s"] if math.isfinite(budget) else []
-    parts += [f"{pace:g} wall s per simulated s"] if math.isfinite(pace) else []
+    parts += [f"{pace:g} s per simulated s"] if math.isfinite(pace) else []
     return " and ".join(parts) or "none"
 
 
 def _words(c: Candidate) -> str:
     return (
         f"{c.method} at spacing {c.spacing:.4g} m (mean dt {c.dt:.3g} s): error {c.error:.1%} (discretisation "
-        f"{c.discretisation:.1%}, bias {c.bias:.1%}), {c.wall:.3g} s, {c.pace:.3g} wall s per simulated s"
+        f"{c.discretisation:.1%}, bias {c.bias:.1%}), {c.seconds:.3g} s, {c.pace:.3g} s per simulated s"
     )
 
 
@@ -61,9 +61,9 @@ def _findings(
         f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}{best.run.target.alone}"
     )
     finer = [c for c in chosen.candidates if c.error <= best.error / 2]
-    faster = [c for c in chosen.candidates if c.wall <= best.wall / 2]
+    faster = [c for c in chosen.candidates if c.seconds <= best.seconds / 2]
     if finer:
-        lines.append(f"Twice as accurate: {_words(min(finer, key=lambda c: c.wall))}.")
+        lines.append(f"Twice as accurate: {_words(min(finer, key=lambda c: c.seconds))}.")
     else:
         lines.append(f"Twice as accurate: nothing tried; {_further(chosen, best)}.")
     if faster:
@@ -94,8 +94,8 @@ def _row(c: Candidate, best: bool) -> dict[str, float | str | bool]:
         "method": c.method,
         "spacing_m": c.spacing,
         "mean_dt_s": c.dt,
-        "wall_s": c.wall,
-        "wall_per_simulated_s": c.pace,
+        "time_s": c.seconds,
+        "time_per_simulated_s": c.pace,
         "error": c.error,
         "discretisation": c.discretisation,
         "bias": c.bias,
@@ -110,22 +110,23 @@ def _candidates(chosen: Selection, front: Sequence[Candidate]) -> Table:
             "method",
             "spacing [m]",
             "mean dt [s]",
-            "wall s",
-            "wall s / sim. s",
+            "time [s]",
+            "s / sim. s",
             "error",
             "discretisation",
             "bias",
             "front",
         ],
-        note="error: of the worst length, relative; front: nothing tried is both faster and more accurate",
+        note="error: of the worst length, relative; time: CPU time on one core, else wall time; front: nothing tried "
+        "is both faster and more accurate",
     )
-    for c in sorted(chosen.candidates, key=lambda c: c.wall):
+    for c in sorted(chosen.candidates, key=lambda c: c.seconds):
         table.rows.append(
             [
                 c.method,
                 number(c.spacing),
                 number(c.dt),
-                number(c.wall),
+                number(c.seconds),
                 number(c.pace),
                 f"{c.error:.1%}",
                 f"{c.discretisation:.1%}",
@@ -151,12 +152,12 @@ def _evidence(chosen: Selection) -> Table:
 
 def _plot(chosen: Selection, front: Sequence[Candidate]) -> Plot:
     """Error against cost; what is dominated is grey."""
-    plot = Plot("pareto", "error against cost", "wall time [s]", "estimated error [%]", log=True)
+    plot = Plot("pareto", "error against cost", "time [s]", "estimated error [%]", log=True)
     rest = [c for c in chosen.candidates if c not in front]
     if rest:
-        plot.traces.append(Trace("dominated", [c.wall for c in rest], [100 * c.error for c in rest], "points", GREY))
+        plot.traces.append(Trace("dominated", [c.seconds for c in rest], [100 * c.error for c in rest], "points", GREY))
     for method in dict.fromkeys(c.method for c in front):
         own = [c for c in front if c.method == method]
-        xs, ys = [c.wall for c in own], [100 * c.error for c in own]
+        xs, ys = [c.seconds for c in own], [100 * c.error for c in own]
         plot.traces.append(Trace(method, xs, ys, "line+points", colour(method)))
     return plot

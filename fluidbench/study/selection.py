@@ -29,6 +29,7 @@ from ..scenario.measured import Measured
 from .lengths import lengths_of
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
+FINEST = 0.5  # and on a GPU
 
 ENOUGH = 3  # spacings needed for an extrapolation
 
@@ -56,8 +57,8 @@ class Candidate:
     method: str
     spacing: float
     dt: float
-    wall: float
-    pace: float  # wall s per simulated s
+    seconds: float  # what it cost, see Record.seconds
+    pace: float  # seconds per simulated s
     discretisation: float
     bias: float
     run: Run
@@ -100,20 +101,22 @@ class Selection:
     def front(self) -> list[Candidate]:
         """The candidates that none beats in both cost and error, cheapest first."""
         best, kept = math.inf, []
-        for c in sorted(self.candidates, key=lambda c: (c.wall, c.error)):
+        for c in sorted(self.candidates, key=lambda c: (c.seconds, c.error)):
             if c.error < best:
                 best = c.error
                 kept.append(c)
         return kept
 
     def recommend(self, tolerance: float, budget: float, pace: float) -> tuple[Candidate | None, str]:
-        """The cheapest within tolerance, wall time [s] and pace (wall s per simulated s); or the nearest, and why."""
+        """The cheapest within tolerance, time [s] and pace (s per simulated s); or the nearest, and why."""
         good = [c for c in self.candidates if c.error <= tolerance]
-        affordable = [c for c in good if c.wall <= budget and c.pace <= pace]
+        affordable = [c for c in good if c.seconds <= budget and c.pace <= pace]
         if affordable:
-            return min(affordable, key=lambda c: c.wall), ""
+            return min(affordable, key=lambda c: c.seconds), ""
         if good:
-            return min(good, key=lambda c: c.wall), "nothing within the tolerance meets the budget; this is the fastest"
+            return min(
+                good, key=lambda c: c.seconds
+            ), "nothing within the tolerance meets the budget; this is the fastest"
         if self.candidates:
             return min(self.candidates, key=lambda c: c.error), "nothing tried meets the tolerance; this is the nearest"
         return None, "no method completed at three spacings"
@@ -270,8 +273,8 @@ def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float], told
         record.method,
         record.spacing_m,
         cost.mean_dt_s,
-        cost.wall_s,
-        cost.wall_per_simulated_s,
+        record.seconds,
+        record.seconds / cost.simulated_s,
         discretisation,
         bias,
         run,

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from fluidbench.errors import UserError
-from fluidbench.paper.archive import INDEX, RECORDS, archives, keep, restore
+from fluidbench.paper.archive import NAME, archives, keep, restore
 from fluidbench.paper.definitions import OPEN
 from fluidbench.paper.table1 import published
 
+INDEX = f"{NAME}.json"
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
 
@@ -40,7 +41,7 @@ def test_records_say_where_and_by_what_they_were_made(found):
 def test_a_verdict_that_does_not_follow_is_seen(tmp_path):
     """Evidence that was changed is refused; evidence that was made anew with another figure gives another table."""
     place = next(path.parent for path in RESULTS.glob(f"*/{INDEX}"))
-    for name in (INDEX, RECORDS):
+    for name in (INDEX, f"{NAME}.parquet"):
         (tmp_path / name).write_bytes((place / name).read_bytes())
     index = json.loads((tmp_path / INDEX).read_text())
     for trial in index["trials"]:

@@ -17,6 +17,7 @@ BARE: dict[str, tuple[str, ...]] = {
     "bench": ("bench", "--quick", "--solvers", "mpm"),
     "ablate": ("ablate", "line_bead"),
     "select": ("select", "line_bead"),
+    "guide": ("guide", "line_bead"),
     "table1": ("table1", "--quick"),
     "table2": ("table2", "--quick"),
     "show": ("show", "line_bead"),
@@ -28,10 +29,10 @@ BARE: dict[str, tuple[str, ...]] = {
 WITHOUT_OUT = ("show", "render", "list", "doctor", "init")
 STUDIES = tuple(verb for verb in BARE if verb not in WITHOUT_OUT)
 HAS = {
-    "--solvers": ("compare", "sweep", "validate", "stability", "bench", "ablate", "select", "table2"),
+    "--solvers": ("compare", "sweep", "validate", "stability", "bench", "ablate", "select", "guide", "table2"),
     "--over": ("sweep",),
     "--worlds": ("sweep",),
-    "--from": ("table1",),
+    "--from": ("table1", "guide"),
     "--seed": ("validate", "table1"),
     "--particles": ("bench",),
     "--axis": ("stability",),
@@ -47,7 +48,7 @@ HAS = {
     "--repeats": ("compare", "table1", "table2"),
     "--jobs": STUDIES,
     "--executor": STUDIES,
-    "--tolerance": ("ablate", "select"),
+    "--tolerance": ("ablate", "select", "guide"),
     "--budget": ("select",),
     "--colour": ("render",),
     "--solver": ("run",),

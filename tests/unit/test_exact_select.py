@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from fluidbench.measure.reference import Answer
+from fluidbench.method.target import Target
 from fluidbench.study import selection as module
 from fluidbench.study.select import candidates, select
 from fluidbench.study.selection import (
@@ -62,7 +63,7 @@ def test_trust_is_more_than_half_of_the_answers_of_this_physics(monkeypatch):
 
 def run(method, spacing, wall=None, answers=(), **measures):
     wall = spacing**-4 if wall is None else wall
-    more = {"wall_s": wall, "wall_per_simulated_s": 2 * wall, "mean_dt_s": 3 * spacing, "answers": list(answers)}
+    more = {"cpu_s": wall, "wall_s": 9 * wall, "simulated_s": 0.5, "mean_dt_s": 3 * spacing, "answers": list(answers)}
     return finished(method, measures=measures, spacing=spacing, **more)
 
 
@@ -120,7 +121,7 @@ def test_error_is_the_distance_to_the_methods_limit_and_the_consensus_over_it(mo
         0.0, abs=1e-9
     )
     one = by_run["sph", 2.0]
-    assert (one.dt, one.wall, one.pace, one.error) == (6.0, 2.0**-4, 2.0**-3, one.discretisation + one.bias)
+    assert (one.dt, one.seconds, one.pace, one.error) == (6.0, 2.0**-4, 2.0**-3, one.discretisation + one.bias)
     trusting(monkeypatch)
     nobody = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + line("sph", 12.0, -0.1))
     assert nobody.candidates[0].bias == pytest.approx(1 / 11)
@@ -265,6 +266,11 @@ def test_four_spacings_are_run_of_every_method_where_the_nozzle_allows(tmp_path)
         (m, pytest.approx(f * 1.5e-3)) for m in ("mpm", "sph") for f in (2.0, 1.5, 1.0, 0.75)
     ]
     assert {j.wall_limit for j in planned} == {5.0}
+    place.target = Target("cuda:0")  # where a finer one costs little
+    assert [j.scenario["spacing"] for j in candidates(BEAD, ["mpm"], place)] == pytest.approx(
+        [3e-3, 2.25e-3, 1.5e-3, 1.125e-3, 0.75e-3]
+    )
+    place.target = Target("cpu")
     planned = candidates(BEAD.model_copy(update={"spacing": 4e-3}), ["mpm"], place)  # 8 mm do not fit twice into 12
     assert [j.scenario["spacing"] for j in planned] == pytest.approx([6e-3, 4e-3, 3e-3])
 

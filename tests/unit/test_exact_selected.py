@@ -30,7 +30,7 @@ def test_findings_name_the_best_and_what_twice_would_take():
     assert lines[0] == "Tolerance 20 %; budget: none."
     assert lines[1] == (
         "Recommended: mpm at spacing 2 m (mean dt 0.0001 s): error 20.0% (discretisation 20.0%, bias 0.0%), 4 s, "
-        "40 wall s per simulated s."
+        "40 s per simulated s."
     )
     assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2 --threads 1"
     assert lines[3].startswith("Twice as accurate: mpm at spacing 1 m") and lines[4].startswith(
@@ -38,7 +38,7 @@ def test_findings_name_the_best_and_what_twice_would_take():
     )
     assert lines[5].endswith("(known answers: emission, yield stress).")
     finest = words(found, 0.1, 60.0, 1.5)
-    assert finest[0] == "Tolerance 10 %; budget: 60 s and 1.5 wall s per simulated s."
+    assert finest[0] == "Tolerance 10 %; budget: 60 s and 1.5 s per simulated s."
     assert "But nothing within the tolerance meets the budget; this is the fastest." in finest[1]
     assert finest[3] == (
         "Twice as accurate: nothing tried; at its observed order of 1 it takes 0.5 of the spacing, 16 times the work."
@@ -81,13 +81,13 @@ def test_tables_and_plot_of_the_candidates(tmp_path):
         change(c.run, machine={"cores": "2"})
         object.__setattr__(c.run, "folder", tmp_path / "runs" / "x")
     data = page.report(BEAD, "line_bead", found, 0.2, *[math.inf] * 2, tmp_path).data
-    assert data["on_front"].tolist() == [True, True, False] and data["wall_s"].tolist() == [8.0, 4.0, 5.0]
+    assert data["on_front"].tolist() == [True, True, False] and data["time_s"].tolist() == [8.0, 4.0, 5.0]
     assert page._row(found.candidates[0], True) == {
         "method": "mpm",
         "spacing_m": 1.0,
         "mean_dt_s": 1e-4,
-        "wall_s": 8.0,
-        "wall_per_simulated_s": 80.0,
+        "time_s": 8.0,
+        "time_per_simulated_s": 80.0,
         "error": pytest.approx(0.11),
         "discretisation": 0.1,
         "bias": 0.01,

@@ -1,0 +1,133 @@
+"""`guide`: which method for what: `select` on the jobs that people have, at several tolerances, as one chart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Unpack
+
+from ..errors import UserError
+from ..method.verdict import lacking
+from ..runs import archive
+from ..runs.record import Run
+from ..scenario import Scenario
+from .guide_report import report
+from .result import Result
+from .select import WALL_LIMIT, candidates
+from .selection import Selection, assess
+from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number
+
+JOBS = {
+    "paste bead": "line_bead",
+    "concrete wall": "concrete_wall",
+    "foam wall": "foam_wall",
+    "honey": "honey_line",
+    "water": "dam_break",
+}
+"""What people simulate, and the shipped scenario that stands for it."""
+TOLERANCES = (0.02, 0.05, 0.10)
+NAME = "selections"  # of what is kept
+
+
+@dataclass(repr=False)
+class Guide(Result):
+    """The choice for every job, machine and tolerance: `table` has a row for each; `studies` by machine and job is what
+    it rests on."""
+
+    studies: dict[str, dict[str, Selection]] = field(default_factory=dict)
+
+    def keep(self, folder: Path) -> None:
+        for jobs in self.studies.values():
+            keep(jobs, folder)
+
+
+def guide(
+    scenarios: Sequence[Scenario | str | Path] | None = None,
+    methods: Sequence[str] | None = None,
+    *,
+    tolerances: Sequence[float] = TOLERANCES,
+    quick: bool = False,
+    **options: Unpack[Options],
+) -> Guide:
+    """Say which method and spacing [m] are the cheapest [s] within each tolerance for each job: what `select` finds,
+    side by side.
+
+    `scenarios`: shipped names, TOML files or scenarios, default those of JOBS; `quick`: the shorter versions of what is
+    named; `methods` are names, default all; `tolerances`: largest relative errors of any length. One run at a time, so
+    that costs mean something. `options` are those of every verb, see Options.
+
+    Raises UserError for what cannot be run, before anything is.
+    """
+    for one in tolerances:
+        require_number(one, "tolerance", 1e-6)
+    names = methods_of(methods, options)
+    place = Workplace.of(options, WALL_LIMIT, names)
+    subjects = subjects_of(scenarios, quick)
+    planned = {job: candidates(scenario, names, place) for job, scenario in subjects.items()}
+    made = iter(place.run([work for own in planned.values() for work in own], "guide"))
+    runs = {job: [next(made) for _ in own] for job, own in planned.items()}
+    studies = {archive.where(r for own in runs.values() for r in own): _assessed(runs, names)}
+    return _concluded(studies, tolerances, place.store.root, keeper=place.keeper)
+
+
+def published(folder: str | Path, tolerances: Sequence[float] = TOLERANCES, out: str | Path | None = None) -> Guide:
+    """Choose again from what studies have kept in a `folder`, or in folders inside it: nothing is run.
+
+    Raises UserError where there is none, and for one that was changed since.
+    """
+    studies: dict[str, dict[str, Selection]] = {}
+    for place in archive.places(Path(folder).expanduser(), NAME, "guide"):
+        jobs = restore(place)
+        machine = archive.where(run for found in jobs.values() for run in found.runs)
+        if machine in studies:
+            raise UserError(f"{archive.shown(place)}: a second study of {machine}; each machine is shown once")
+        studies[machine] = jobs
+    root = Path(folder if out is None else out).expanduser().absolute()
+    return _concluded(studies, tolerances, root, kept=True)
+
+
+def subjects_of(scenarios: Sequence[Scenario | str | Path] | None, quick: bool) -> dict[str, Scenario]:
+    """Scenario by job; raises UserError for one that is named twice."""
+    given: Iterable[Any] = names_of(scenarios, "scenario") or JOBS.values()
+    titles = {name: job for job, name in JOBS.items()}
+    found: dict[str, Scenario] = {}
+    for one in given:
+        scenario = as_scenario(one, quick)
+        job = titles.get(scenario.name, scenario.name)
+        if job in found:
+            raise UserError(f"scenario: {job} is named twice")
+        found[job] = scenario
+    return found
+
+
+def _concluded(studies: dict[str, dict[str, Selection]], tolerances: Sequence[float], root: Path, **more: Any) -> Guide:
+    selections = [found for jobs in studies.values() for found in jobs.values()]
+    runs = [run for found in selections for run in found.runs]
+    missing = lacking(runs, refusals=False)
+    ok = all(found.candidates for found in selections)
+    return Guide(report(studies, sorted(tolerances), root), root, runs, missing, ok, studies=studies, **more)
+
+
+def _assessed(runs: Mapping[str, Sequence[Run]], methods: Sequence[str]) -> dict[str, Selection]:
+    """Every run has its scenario as it was run, but for the spacing the same."""
+    return {job: assess(own[0].scenario, methods, own) for job, own in runs.items() if own}
+
+
+def keep(jobs: Mapping[str, Selection], folder: Path) -> None:
+    """Write the records of all runs, and which job they are of, into a folder."""
+    index = {
+        "jobs": {job: [run.folder.name for run in found.runs] for job, found in jobs.items()},
+        "methods": list(dict.fromkeys(run.method for found in jobs.values() for run in found.runs)),
+    }
+    archive.keep(folder, NAME, index, (run for found in jobs.values() for run in found.runs))
+
+
+def restore(folder: Path) -> dict[str, Selection]:
+    """What a folder keeps, judged anew by the known answers of this edition."""
+    index, runs = archive.restore(folder, NAME)
+    try:
+        own = {job: [runs[name] for name in names] for job, names in index["jobs"].items()}
+        return _assessed(own, index["methods"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(archive.another_edition(folder, error)) from None
