@@ -6,13 +6,18 @@ import re
 from base64 import b64encode
 from typing import TYPE_CHECKING, Any
 
-from .plot import Plot
+import numpy as np
+
+from .plot import Cloud, Plot
 from .table import Table
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
     from .report import Report
+
+
+PIXELS = 260.0  # that the longest edge of a cloud takes
 
 
 def environment() -> Environment:
@@ -36,10 +41,10 @@ def page(report: Report, images: dict[str, bytes]) -> str:
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 
-    def drawn(plots: list[Plot]) -> list[Markup]:
+    def drawn(figures: list[Any]) -> list[Markup]:
         shape = {"full_html": False, "include_plotlyjs": False, "default_width": "100%", "default_height": "100%"}
         config = {"displaylogo": False, "responsive": True}
-        return [Markup(interactive(p).to_html(config=config, **shape)) for p in plots]
+        return [Markup(figure.to_html(config=config, **shape)) for figure in figures]
 
     lists = [
         ("Runs that are not results", report.failures, "bad"),
@@ -53,8 +58,9 @@ def page(report: Report, images: dict[str, bytes]) -> str:
             script=Markup(f"<script>{get_plotlyjs()}</script>"),
             lists=[item for item in lists if item[1]],
             images=[(image, b64encode(images[image.name]).decode()) for image in report.images],
-            plots=drawn(report.plots),
-            sections=[(section, drawn(section.plots)) for section in report.sections],
+            plots=drawn([interactive(plot) for plot in report.plots]),
+            clouds=drawn([turning(cloud) for cloud in report.clouds]),
+            sections=[(section, drawn([interactive(plot) for plot in section.plots])) for section in report.sections],
         )
     )
 
@@ -100,4 +106,35 @@ def interactive(plot: Plot) -> Any:
         figure.update_yaxes(type="log")
     if plot.equal:
         figure.update_yaxes(scaleanchor="x", scaleratio=1)
+    return figure
+
+
+def turning(cloud: Cloud) -> Any:
+    """A cloud as a plotly figure that can be turned and zoomed, to scale."""
+    import plotly.graph_objects as go
+
+    x, y, z = cloud.position.T
+    edges = [max(float(np.ptp(axis)), cloud.size) for axis in (x, y, z)]
+    longest = max(edges)
+    low, high = cloud.limits
+    marker = {
+        "size": float(np.clip(PIXELS * cloud.size / longest, 2.0, 14.0)),
+        "color": cloud.value.tolist(),
+        "colorscale": "Viridis",
+        "cmin": low,
+        "cmax": high,
+        "colorbar": {"title": {"text": cloud.legend}, "thickness": 10, "len": 0.6, "orientation": "h", "y": -0.1},
+    }
+    figure = go.Figure(
+        go.Scatter3d(x=x.tolist(), y=y.tolist(), z=z.tolist(), mode="markers", marker=marker, hoverinfo="skip")
+    )
+    away = 0.8 * longest / float(np.prod(edges)) ** (1 / 3)  # plotly scales the box to a volume of one
+    titles: dict[str, Any] = {f"{name}axis": {"title": f"{name} [mm]", "showbackground": name == "z"} for name in "xyz"}
+    camera = {"eye": {"x": 0.35 * away, "y": -1.5 * away, "z": 0.7 * away}}
+    figure.update_layout(
+        title={"text": cloud.title, "font": {"size": 13}},
+        scene={"aspectmode": "data", "camera": camera, **titles},
+        margin={"l": 0, "r": 0, "t": 40, "b": 0},
+        modebar={"orientation": "v"},
+    )
     return figure

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..registry import method_names
+
+if TYPE_CHECKING:
+    import numpy as np
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe & Ito: distinct for colour-blind readers."""
@@ -38,6 +41,20 @@ class Trace:
     style: str = "line"
     colour: str = "#000000"
     spread: list[float] | None = None
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Particles to turn about on the page: positions (n, 3) and, of each, what it is coloured by (n,), whose name and
+    unit are `legend`, between `limits`; `size` is a particle's, in the positions' unit."""
+
+    name: str
+    title: str
+    position: np.ndarray
+    value: np.ndarray
+    legend: str
+    limits: tuple[float, float]
+    size: float
 
 
 @dataclass(frozen=True)

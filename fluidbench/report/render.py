@@ -18,6 +18,8 @@ from ..scenario import Scenario
 
 COLOURS = ("layer", "phase", "speed", "stress", "density", "height")
 WINDOW, TURNS, FPS = (1280, 960), 90, 20
+PICTURES = 20_000  # of a film: a quarter of an hour
+RULERS = (1.0, 2.0, 5.0)  # times a power of ten: lengths that a scale bar may have
 LAYERS = ("#3473b7", "#f29e40")  # alternating, as in the paper's pictures
 
 
@@ -95,10 +97,21 @@ class Stage:
         self.limits = (0.0, 1.0) if colour == "layer" else (float(values.min()), float(values.max()) + 1e-12)
         floor = (self.center[0], self.center[1], scenario.domain.lower[2])
         self.plotter.add_mesh(
-            self.pv.Plane(center=floor, i_size=2 * self.size, j_size=2 * self.size), color="#e8e8e8", ambient=0.4
+            self.pv.Plane(center=floor, i_size=2 * self.size, j_size=2 * self.size), color="#dedede", lighting=False
         )
         self.plotter.set_background("white")
+        self._lay_ruler(low, high)
         self.look(0.0)
+
+    def _lay_ruler(self, low: np.ndarray, high: np.ndarray) -> None:
+        """A scale bar on the floor before the matter, a third of it or less, with its length."""
+        length = ruler(float(high[0] - low[0]) / 3.0)
+        start = np.array([low[0], low[1] - 0.12 * self.size, self.scenario.domain.lower[2] + 2e-3 * self.size])
+        end = start + np.array([length, 0.0, 0.0])
+        self.plotter.add_mesh(self.pv.Line(start, end), color="black", line_width=4)
+        label = f"{1e3 * length:g} mm" if length < 1.0 else f"{length:g} m"
+        style = {"font_size": 22, "text_color": "black", "shape": None, "show_points": False, "always_visible": True}
+        self.plotter.add_point_labels([0.5 * (start + end)], [label], **style)
 
     def look(self, turn: float) -> None:
         """Put the camera at an angle about the vertical [rad]."""
@@ -108,6 +121,7 @@ class Stage:
     def show(self, frame: dict[str, np.ndarray]) -> None:
         """Replace what is on the stage."""
         self.plotter.remove_actor("matter", render=False)
+        self.plotter.add_text(f"t = {float(frame['time']):.2f} s", name="clock", color="black", font_size=12)
         if not len(frame["position"]):
             return
         style: dict[str, Any] = (
@@ -123,8 +137,25 @@ class Stage:
         return path
 
 
-def render(folder: Path, colour: str, turntable: bool, film: bool) -> list[Path]:
-    """Draw a run into its folder: render.png, and where asked turntable.mp4 and film.mp4; returns the files."""
+def ruler(longest: float) -> float:
+    """The longest of 1, 2, 5 times a power of ten that is no longer than this [m]."""
+    step = 10.0 ** np.floor(np.log10(longest))
+    return float(max(r * step for r in RULERS if r * step <= longest * (1.0 + 1e-9)))
+
+
+def shown_at(times: np.ndarray, pace: float) -> np.ndarray:
+    """The snapshot that each picture of a film shows, FPS a second: the last one taken by then, where `pace` simulated
+    seconds pass in one of the film."""
+    span = float(times[-1] - times[0])
+    if span * FPS / pace > PICTURES:
+        raise UserError(f"pace = {pace:g}: {span * FPS / pace:.3g} pictures; a film has {PICTURES} at most")
+    clock = times[0] + pace * np.arange(int(np.ceil(span * FPS / pace - 1e-9)) + 1) / FPS
+    return np.searchsorted(times, np.minimum(clock, times[-1]) + 1e-9 * span, side="right") - 1
+
+
+def render(folder: Path, colour: str, turntable: bool, film: bool, pace: float = 1.0) -> list[Path]:
+    """Draw a run into its folder: render.png, and where asked turntable.mp4 and film.mp4, in real time or at `pace`
+    times that; returns the files."""
     scenario, frames = load(folder)
     if film and len(frames) < 2:
         raise UserError(f"{folder}: a film needs snapshots; run it with --frames")
@@ -136,7 +167,8 @@ def render(folder: Path, colour: str, turntable: bool, film: bool) -> list[Path]
         made.append(_movie(stage, folder / "turntable.mp4", steps))
         stage.look(0.0)
     if film:
-        made.append(_movie(stage, folder / "film.mp4", (lambda f=frame: stage.show(f) for frame in frames)))
+        chosen = shown_at(np.array([float(frame["time"]) for frame in frames]), pace)
+        made.append(_movie(stage, folder / "film.mp4", (lambda i=i: stage.show(frames[i]) for i in chosen)))
     stage.plotter.close()
     return made
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ..files import write_atomically, write_parquet
 from ..runs.record import Run
 from ..runs.store import RECORD
-from .plot import Plot
+from .plot import Cloud, Plot
 from .table import Table, show
 
 if TYPE_CHECKING:
@@ -23,12 +23,13 @@ Runs = dict[str, list[tuple[str, str]]]  # links to records by heading
 
 @dataclass(frozen=True)
 class Image:
-    """A picture that no plot is; `draw` makes it, as PNG."""
+    """A picture that no plot is; `draw` makes it, as PNG. One that `opens` the page stands before its tables."""
 
     name: str
     title: str
     alt: str
     draw: Callable[[], bytes]
+    opens: bool = False
 
 
 @dataclass
@@ -76,6 +77,7 @@ class Report:
     failures: list[str] = field(default_factory=list)  # runs that are not results, with advice
     notes: list[str] = field(default_factory=list)
     images: list[Image] = field(default_factory=list)
+    clouds: list[Cloud] = field(default_factory=list)  # on the page alone
     sections: list[Section] = field(default_factory=list)
     details: list[Detail] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)

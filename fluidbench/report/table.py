@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import mean, stdev
@@ -70,10 +71,18 @@ UNITS = {"m": "m", "m2": "m²", "kg": "kg", "J": "J", "s": "s", "Pa": "Pa", "MiB
 
 def readable(key: str, values: Sequence[float]) -> tuple[str, float]:
     """(label, factor) under which the values of a measure read best: lengths below a metre in millimetres."""
-    unit = key.rpartition("_")[2]
-    if unit in ("m", "m2") and values and max(map(abs, values)) < 1.0:
-        return label(key).replace("[m", "[mm"), 1e3 if unit == "m" else 1e6
-    return label(key), 1.0
+    return in_millimetres(label(key), values)
+
+
+def in_millimetres(title: str, values: Sequence[float]) -> tuple[str, float]:
+    """(title, factor) under which values of a quantity read best: "x [m]" below a metre in millimetres, "x [m^2]" in
+    their squares."""
+    text, bracket, unit = title.partition(" [")
+    factor, better = {"m]": (1e3, "mm]"), "m^2]": (1e6, "mm²]"), "m²]": (1e6, "mm²]")}.get(unit, (1.0, unit))
+    finite = [abs(value) for value in values if math.isfinite(value)]
+    if not finite or max(finite) >= 1.0:
+        return title, 1.0
+    return f"{text}{bracket}{better}", factor
 
 
 def label(key: str) -> str:

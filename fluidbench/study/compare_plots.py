@@ -10,6 +10,7 @@ import numpy as np
 from ..measure.ledger import bead_of, deposit_of
 from ..measure.reference import DoesNotApply, martin_moyce
 from ..report.plot import Plot, Trace, colour
+from ..report.table import in_millimetres
 from ..runs.record import Run
 from ..scenario import Scenario
 from ..scenario.measured import Measured
@@ -68,24 +69,24 @@ def _series_plots(done: Sequence[Run], scenario: Scenario) -> list[Plot]:
     }
     found = []
     for column, (name, title, axis) in wanted.items():
+        own = {result.label: result.series for result in done if column in result.series}
+        axis, factor = in_millimetres(axis, [float(np.abs(series[column]).max()) for series in own.values()])
         plot = Plot(name, title, "time [s]", axis)
-        for result in done:
-            series = result.series
-            if column in series:
-                plot.traces.append(
-                    Trace(result.label, series["time_s"].tolist(), series[column].tolist(), colour=colour(result.label))
-                )
+        for label, series in own.items():
+            ys = (factor * series[column]).tolist()
+            plot.traces.append(Trace(label, series["time_s"].tolist(), ys, colour=colour(label)))
         if column == "front_x_m" and scenario.reference == "martin_moyce_front" and plot.traces:
             with suppress(DoesNotApply):  # said beside the table of references
-                plot.traces.append(_martin_moyce(scenario))
+                plot.traces.append(_martin_moyce(scenario, factor))
         found.append(plot)
     return found
 
 
-def _martin_moyce(scenario: Scenario) -> Trace:
+def _martin_moyce(scenario: Scenario, factor: float) -> Trace:
+    """The published points, in the plot's unit, `factor` times metres."""
     a, rate, data = martin_moyce(scenario)
     clock = (data["T"] / rate).tolist()
-    return Trace("Martin & Moyce 1952 (gate clock)", clock, (a * data["Z"]).tolist(), style="points")
+    return Trace("Martin & Moyce 1952 (gate clock)", clock, (factor * a * data["Z"]).tolist(), style="points")
 
 
 def _cost_plots(results: Sequence[Run]) -> list[Plot]:

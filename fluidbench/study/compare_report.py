@@ -13,8 +13,9 @@ from .again import settings_of
 from .compare_measured import against_measured, measured_plot, values_of
 from .compare_plots import plots
 from .compare_tables import against_reference, backends, costs, failed_prints, fidelity, successes
-from .compare_views import views
+from .compare_views import clouds, views
 from .headline import headline
+from .sketch import sketch
 
 ADVICE = {
     Verdict.DIVERGED: "its results are left out of every comparison",
@@ -52,7 +53,8 @@ def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measur
             *expected,
             *(f"{run.label}: {line}" for run in runs if run.record.repeat == 0 for line in run.record.approximations),
         ],
-        images=views(runs),
+        images=[*([sketch(first.scenario)] if first else []), *views(runs)],
+        clouds=clouds(runs),
         prefix="" if verb == "compare" else f"{verb}-",
     )
 

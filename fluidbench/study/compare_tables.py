@@ -9,7 +9,7 @@ from statistics import mean
 from ..measure.rest import LAST, STILL
 from ..measure.tower import Print
 from ..method.verdict import Evidence, evidence_of
-from ..report.table import Table, label, number, readable, spread
+from ..report.table import Table, in_millimetres, label, number, readable, spread
 from ..runs.record import Record, Run
 from .lengths import lengths_of
 
@@ -53,10 +53,12 @@ def against_reference(results: Sequence[Run]) -> Table | None:
     for result in results:
         if result.record.repeat == 0:
             for a in result.record.answers:
-                measured = number(a.measured) + (MOVES if a.reads in result.record.moving else "")
+                title, factor = in_millimetres(a.quantity, [a.measured, a.reference])
+                measured = number(factor * a.measured) + (MOVES if a.reads in result.record.moving else "")
                 percent = not a.measure.startswith(("absolute", "in discs"))
                 error = f"{100 * a.error:.2f} %" if percent else f"{a.error:.4f}"
-                table.rows.append([a.quantity, result.label, measured, number(a.reference), error, a.measure, a.source])
+                wanted = number(factor * a.reference)
+                table.rows.append([title, result.label, measured, wanted, error, a.measure, a.source])
     table = replace(table, note="\n".join(f"not compared: {line}" for line in reasons))
     return table if table.rows or reasons else None
 

@@ -44,7 +44,7 @@ def _budget(budget: float, pace: float) -> str:
 
 def _words(c: Candidate) -> str:
     return (
-        f"{c.method} at spacing {c.spacing:.4g} m (mean dt {c.dt:.3g} s): error {c.error:.1%} (discretisation "
+        f"{c.method} at spacing {1e3 * c.spacing:.4g} mm (mean dt {c.dt:.3g} s): error {c.error:.1%} (discretisation "
         f"{c.discretisation:.1%}, bias {c.bias:.1%}), {c.seconds:.3g} s, {c.pace:.3g} s per simulated s"
     )
 
@@ -108,7 +108,7 @@ def _candidates(chosen: Selection, front: Sequence[Candidate]) -> Table:
         "Every setting tried",
         [
             "method",
-            "spacing [m]",
+            "spacing [mm]",
             "mean dt [s]",
             "time [s]",
             "s / sim. s",
@@ -124,7 +124,7 @@ def _candidates(chosen: Selection, front: Sequence[Candidate]) -> Table:
         table.rows.append(
             [
                 c.method,
-                number(c.spacing),
+                number(1e3 * c.spacing),
                 number(c.dt),
                 number(c.seconds),
                 number(c.pace),

@@ -36,7 +36,7 @@ ANSWERS = (
 def summary(trials: Sequence[Trial]) -> Table:
     """Case, method, spacing, error, tolerance, order, cost and verdict, one row a trial."""
     slopes = orders(trials)
-    head = ["case", "method", "spacing [m]", "particles", "error", "tolerance", "order", "wall s / sim. s", "verdict"]
+    head = ["case", "method", "spacing [mm]", "particles", "error", "tolerance", "order", "wall s / sim. s", "verdict"]
     verdicts = ", ".join(f"{n} {verdict}" for verdict, n in Counter(t.verdict for t in trials).items())
     note = "order: slope of log error over log spacing (number of spacings); exempt: run, but not expected to pass"
     table = Table("Known answers", head, note=f"{verdicts}; {note}")
@@ -46,7 +46,7 @@ def summary(trials: Sequence[Trial]) -> Table:
             [
                 t.case.name,
                 t.method,
-                number(t.spacing),
+                number(1e3 * t.spacing),
                 f"{t.cost.get('particles', 0):.0f}",
                 shown_error(t.error),
                 number(t.tolerance),
@@ -163,10 +163,10 @@ def _machine(trials: Sequence[Trial]) -> dict[str, str]:
 
 
 def _numbers(trials: Sequence[Trial]) -> Table:
-    table = Table("", ["quantity", "method", "spacing [m]", "measured", "reference"])
+    table = Table("", ["quantity", "method", "spacing [mm]", "measured", "reference"])
     for t in trials:
         for n in t.finding.numbers if t.finding else ():
-            table.rows.append([n.quantity, t.method, number(t.spacing), number(n.measured), number(n.reference)])
+            table.rows.append([n.quantity, t.method, number(1e3 * t.spacing), number(n.measured), number(n.reference)])
     return table
 
 

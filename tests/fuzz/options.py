@@ -51,6 +51,7 @@ HAS = {
     "--tolerance": ("ablate", "select", "guide"),
     "--budget": ("select",),
     "--colour": ("render",),
+    "--pace": ("render",),
     "--solver": ("run",),
     "--checkpoint-every": ("compare", "run"),
     "--measured": ("compare", "run", "select"),
@@ -205,6 +206,7 @@ REALS = (
 WHOLES = ("0", "-1", "1.5", "nan", "inf", "1e300", "text", "", "true", "9" * 30, "9" * 5000, "-" + "9" * 30)
 VALUES = {
     "--wall-limit": REALS,
+    "--pace": (*REALS, "0"),
     "--checkpoint-every": REALS,
     "--render-every": (*REALS, "0", "1e-12"),
     "--spacing": (*REALS, "0", "1e-12"),

@@ -60,7 +60,7 @@ def test_the_published_table_has_a_row_a_trial():
         "case",
         "physics",
         "method",
-        "spacing [m]",
+        "spacing [mm]",
         "particles",
         "error",
         "tolerance",
@@ -72,10 +72,10 @@ def test_the_published_table_has_a_row_a_trial():
     ]
     end = ["relative", "a book"]
     assert rows[2:] == [
-        ["drop", "liquid", "mpm", "0.01", "10", "0.0421", "0.1", "2.00 (2)", "6", "pass", *end],
-        ["drop", "liquid", "mpm", "0.02", "10", "0.168", "0.2", "2.00 (2)", "2", "MISS", *end],
-        ["drop", "liquid", "sph", "0.01", "0", "-", "0.1", "-", "-", "timeout", *end],
-        ["law", "numerics", "law", "0.01", "10", "1e-07", "0.1", "-", "2", "pass", *end],
+        ["drop", "liquid", "mpm", "10", "10", "0.0421", "0.1", "2.00 (2)", "6", "pass", *end],
+        ["drop", "liquid", "mpm", "20", "10", "0.168", "0.2", "2.00 (2)", "2", "MISS", *end],
+        ["drop", "liquid", "sph", "10", "0", "-", "0.1", "-", "-", "timeout", *end],
+        ["law", "numerics", "law", "10", "10", "1e-07", "0.1", "-", "2", "pass", *end],
     ]
     assert "- drop, sph: timeout: slow" in text and "2 pass, 1 MISS, 1 timeout; order:" in text
     escaped = known()
@@ -101,7 +101,7 @@ def test_results_are_written_with_their_numbers(tmp_path):
         (row,) = made
         assert json.loads(row["numbers"]) == [{"quantity": "height", "measured": 1.0, "reference": 2.0}]
         assert json.loads(row["runs"]) == {"a": "runs/x"} and row["error"] == 0.1
-    assert page._numbers(rows).rows == [["height", "mpm", "0.01", "1", "2"]]
+    assert page._numbers(rows).rows == [["height", "mpm", "10", "1", "2"]]
 
 
 def test_profiles_are_of_the_finest_and_work_precision_goes_by_cost():

@@ -163,6 +163,7 @@ def test_a_methods_colour_goes_by_its_place():
 def test_a_comparison_holds_what_it_was_asked_for(tmp_path, monkeypatch):
     monkeypatch.setattr(compare_report, "plots", lambda *_: [])
     monkeypatch.setattr(compare_report, "views", lambda _: [])
+    monkeypatch.setattr(compare_report, "clouds", lambda _: [])
     calls = working(
         monkeypatch, lambda job: finished(job.method, repeat=job.repeat, backend=job.target.backend, prepare_s=1.0)
     )
@@ -203,6 +204,7 @@ def test_a_comparison_holds_what_it_was_asked_for(tmp_path, monkeypatch):
 def test_a_comparison_is_whole_with_a_result_and_nothing_lacking(tmp_path, monkeypatch, verdicts, fine):
     monkeypatch.setattr(compare_report, "plots", lambda *_: [])
     monkeypatch.setattr(compare_report, "views", lambda _: [])
+    monkeypatch.setattr(compare_report, "clouds", lambda _: [])
     ends = dict(zip(("mpm", "sph"), verdicts, strict=True))
     working(monkeypatch, lambda job: finished(job.method, ends[job.method]))
     assert module.compare(BEAD, ["mpm", "sph"], out=tmp_path, progress=False).ok is fine
@@ -211,6 +213,7 @@ def test_a_comparison_is_whole_with_a_result_and_nothing_lacking(tmp_path, monke
 def test_runs_without_a_folder_live_as_long_as_they_are_held(monkeypatch):
     monkeypatch.setattr(compare_report, "plots", lambda *_: [])
     monkeypatch.setattr(compare_report, "views", lambda _: [])
+    monkeypatch.setattr(compare_report, "clouds", lambda _: [])
     working(monkeypatch)
     run = module.run(BEAD, "mpm", progress=False)  # its result is gone, its folder is not
     gc.collect()

@@ -29,12 +29,12 @@ def test_findings_name_the_best_and_what_twice_would_take():
     lines = words(found)
     assert lines[0] == "Tolerance 20 %; budget: none."
     assert lines[1] == (
-        "Recommended: mpm at spacing 2 m (mean dt 0.0001 s): error 20.0% (discretisation 20.0%, bias 0.0%), 4 s, "
+        "Recommended: mpm at spacing 2000 mm (mean dt 0.0001 s): error 20.0% (discretisation 20.0%, bias 0.0%), 4 s, "
         "40 s per simulated s."
     )
     assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2 --threads 1"
-    assert lines[3].startswith("Twice as accurate: mpm at spacing 1 m") and lines[4].startswith(
-        "Twice as fast: mpm at spacing 4 m"
+    assert lines[3].startswith("Twice as accurate: mpm at spacing 1000 mm") and lines[4].startswith(
+        "Twice as fast: mpm at spacing 4000 mm"
     )
     assert lines[5].endswith("(known answers: emission, yield stress).")
     finest = words(found, 0.1, 60.0, 1.5)
@@ -43,7 +43,7 @@ def test_findings_name_the_best_and_what_twice_would_take():
     assert finest[3] == (
         "Twice as accurate: nothing tried; at its observed order of 1 it takes 0.5 of the spacing, 16 times the work."
     )
-    assert finest[4].startswith("Twice as fast: mpm at spacing 2 m")
+    assert finest[4].startswith("Twice as fast: mpm at spacing 2000 mm")
     assert words(found, 0.4)[4] == "Twice as fast: nothing tried."
     assert words(Selection([], {}, {}, [], ["note"])) == [
         "No recommendation: no method completed at three spacings.",
@@ -54,7 +54,7 @@ def test_findings_name_the_best_and_what_twice_would_take():
 def test_twice_as_accurate_is_the_cheapest_and_twice_as_fast_the_most_accurate():
     found = made((1.0, 9.0, 0.1), (2.0, 8.0, 0.1), (3.0, 4.0, 0.2), (4.0, 2.0, 0.5), (5.0, 1.5, 0.6), (6.0, 8.5, 0.05))
     lines = words(found)
-    assert "spacing 3 m" in lines[1] and "spacing 2 m" in lines[3] and "spacing 4 m" in lines[4]
+    assert "spacing 3000 mm" in lines[1] and "spacing 2000 mm" in lines[3] and "spacing 4000 mm" in lines[4]
 
 
 def test_what_half_the_error_takes():
@@ -70,8 +70,8 @@ def test_tables_and_plot_of_the_candidates(tmp_path):
     found = made((1.0, 8.0, 0.1), (2.0, 4.0, 0.2), (4.0, 5.0, 0.4), bias=0.01)
     front = found.front()
     rows = page._candidates(found, front).rows
-    assert rows[0] == ["mpm", "2", "0.0001", "4", "40", "21.0%", "20.0%", "1.0%", "yes"]
-    assert [row[1] for row in rows] == ["2", "4", "1"] and [row[-1] for row in rows] == ["yes", "-", "yes"]
+    assert rows[0] == ["mpm", "2000", "0.0001", "4", "40", "21.0%", "20.0%", "1.0%", "yes"]
+    assert [row[1] for row in rows] == ["2000", "4000", "1000"] and [row[-1] for row in rows] == ["yes", "-", "yes"]
     found.trust["sph"] = Trust(1, 4)
     assert page._evidence(found).rows == [["mpm", "1", "1 of 1", "yes"], ["sph", "nan", "1 of 4", "no"]]
     dominated, best = page._plot(found, front).traces

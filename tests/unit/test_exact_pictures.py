@@ -1,0 +1,116 @@
+"""What pictures show: sizes in the sketch, colours of particles, clouds on the page, scale bars, films in real time."""
+
+import numpy as np
+import pytest
+
+from fluidbench.errors import UserError
+from fluidbench.report.figures import figure_of
+from fluidbench.report.page import turning
+from fluidbench.report.plot import Cloud
+from fluidbench.report.render import ruler, shown_at
+from fluidbench.report.table import in_millimetres
+from fluidbench.scenario.library import load
+from fluidbench.study import compare_views as views
+from fluidbench.study import sketch
+
+from ..conftest import scenario
+from .made import BEAD, finished
+
+
+def test_a_sketch_tells_the_sizes_in_millimetres():
+    assert sketch.sizes(BEAD) == ["bore 12 mm", "gap 10 mm", "exit 100 mm/s", "nozzle 100 mm/s", "spacing 1.5 mm"]
+    assert sketch.sizes(load("wall"))[4] == "3 layers"
+    assert len(sketch.sizes(load("dam_break"))) == 1
+    assert sketch.sketch(BEAD).opens and "gap 10 mm" in sketch.sketch(BEAD).alt
+
+
+@pytest.mark.parametrize("name", ["line_bead", "ring_tower_drone", "column_slump", "foam_tower"])
+def test_what_is_sketched_lies_within_the_picture(name, monkeypatch):
+    seen = []
+    monkeypatch.setattr(sketch, "figure_of", lambda *size: seen.append(figure_of(*size)) or seen[-1])
+    made = load(name)
+    assert sketch.draw(made)[:4] == b"\x89PNG"
+    for axes, up in zip(seen[0].axes, (2, 1), strict=True):
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        if made.track is not None:
+            x, y = 1e3 * made.track.position[:, [0, up]].T
+            assert left < x.min() and x.max() < right and low < y.min() and y.max() < high
+        for cloud in axes.collections:
+            x, y = np.asarray(cloud.get_offsets()).reshape(-1, 2).T
+            assert not len(x) or (left < x.min() and x.max() < right and low <= y.min() and y.max() < high)
+
+
+def frame(speeds, births):
+    n = len(speeds)
+    x = np.linspace(0.0, 1.0, n)
+    velocity = np.stack([speeds, np.zeros(n), np.zeros(n)], axis=1)
+    return {"position": np.stack([x, x, x], axis=1), "velocity": velocity, "birth_time": births, "time": 1.05}
+
+
+def run_of(made):
+    return finished(input=made.model_dump(mode="json"))
+
+
+def test_colours_are_speed_while_it_moves_then_layer_or_time_of_laying():
+    births = np.array([0.1, 0.5, 0.8])
+    still, moving = frame(np.zeros(3), births), frame(np.full(3, 0.05), births)
+    scale = views._scale([run_of(BEAD)], [still])
+    assert (scale.label, scale.limits) == ("laid at [s]", (0.0, BEAD.track.end)) and (scale.value(still) == births).all()
+    scale = views._scale([run_of(BEAD)], [still, moving])
+    assert (scale.label, scale.limits) == ("speed [m/s]", (0.0, pytest.approx(0.05)))
+    wall = load("wall")
+    late = frame(np.zeros(2), np.array([0.1, wall.track.end]))
+    scale = views._scale([run_of(wall)], [late])
+    assert (scale.label, scale.limits) == ("layer", (1.0, 3.0)) and scale.value(late).tolist() == [1.0, 3.0]
+    assert views._scale([run_of(scenario())], [still]).label == "speed [m/s]"
+
+
+def test_one_fast_particle_leaves_the_others_their_colours():
+    speeds = np.full(1000, 0.001)
+    speeds[0] = 1.0
+    assert views._scale([run_of(BEAD)], [frame(speeds, np.zeros(1000))]).label == "laid at [s]"
+
+
+def test_a_cloud_is_thinned_and_says_so(monkeypatch):
+    monkeypatch.setattr(views, "MOST", 2)
+    run = run_of(BEAD)
+    monkeypatch.setattr(type(run), "frame", lambda _: frame(np.zeros(3), np.array([0.1, 0.5, 0.8])))
+    (cloud,) = views.clouds([run, finished("sph", "diverged")])
+    assert cloud.title == "mpm, t = 1.05 s, 2 of 3 particles" and cloud.position.shape == (2, 3)
+    assert cloud.position.max() <= 1e3 and cloud.size == 1.5
+
+
+def test_a_cloud_on_the_page_is_to_scale():
+    position = np.array([[0.0, 0.0, 0.0], [130.0, 10.0, 1.0]])
+    figure = turning(Cloud("mpm", "mpm at the end", position, np.array([0.0, 1.0]), "layer", (1.0, 2.0), 1.5))
+    (points,) = figure.data
+    assert list(points.x) == [0.0, 130.0] and figure.layout.scene.aspectmode == "data"
+    assert points.marker.size == pytest.approx(3.0) and (points.marker.cmin, points.marker.cmax) == (1.0, 2.0)
+    assert figure.layout.scene.xaxis.title.text == "x [mm]"
+    alone = turning(Cloud("mpm", "one", position[:1], np.zeros(1), "layer", (1.0, 2.0), 1.5))
+    assert alone.data[0].marker.size == 14.0  # one particle, no larger than a thumb
+
+
+@pytest.mark.parametrize(("longest", "length"), [(0.03, 0.02), (0.05, 0.05), (0.0499, 0.02), (1.0, 1.0), (9.0, 5.0)])
+def test_a_scale_bar_is_a_round_length(longest, length):
+    assert ruler(longest) == pytest.approx(length)
+
+
+def test_a_film_takes_as_long_as_what_it_shows():
+    times = np.array([0.0, 0.5, 0.6, 2.0])
+    shown = shown_at(times, 1.0)
+    assert len(shown) == 41 and shown[0] == 0 and shown[9] == 0 and shown[10] == 1 and shown[12] == 2
+    assert shown[39] == 2 and shown[40] == 3
+    assert len(shown_at(times, 2.0)) == 21 and len(shown_at(times, 0.5)) == 81
+    assert len(shown_at(times, 100.0)) == 2
+    with pytest.raises(UserError, match="4e\\+07 pictures; a film has 20000 at most"):
+        shown_at(times, 1e-6)
+
+
+def test_lengths_below_a_metre_read_in_millimetres():
+    assert in_millimetres("front [m]", [0.2, -0.3]) == ("front [mm]", 1e3)
+    assert in_millimetres("front [m]", [0.2, 1.0]) == ("front [m]", 1.0)
+    assert in_millimetres("bead area [m^2]", [1e-4, float("nan")]) == ("bead area [mm²]", 1e6)
+    assert in_millimetres("bead area [m²]", [1e-4]) == ("bead area [mm²]", 1e6)
+    assert in_millimetres("energy [J]", [1e-4]) == ("energy [J]", 1.0)
+    assert in_millimetres("front [m]", []) == ("front [m]", 1.0)
