@@ -240,6 +240,7 @@ def table1(
 @running(wall_limit=1800.0)
 def table2(
     solvers: Solvers = "mpm",
+    from_: From = None,
     pools: Annotated[str, typer.Option(help="pool sizes to preallocate; `fit` is as many as needed")] = "fit,298000",
     repeats: Annotated[int, typer.Option(min=1, help="runs of each row, without and with pictures")] = 5,
     quick: Quick = False,
@@ -250,8 +251,12 @@ def table2(
 
     A second call reuses the runs that are finished.
     """
+    from ..paper.table2 import published
     from ..paper.table2 import table2 as study
 
+    if from_ is not None:
+        finish(published(from_, placed(options, "table2-published").get("out")))
+        return
     sizes = [None if part == "fit" else count_of(part, "--pools") for part in names_in(pools, "--pools", "pool")]
     more = placed(options, "table2")
     finish(study(methods_in(solvers), pools=sizes, repeats=repeats_of(repeats), quick=quick, **more))

@@ -31,11 +31,12 @@ SAME, BOTTLENECK = 1.2, 0.5
 
 @dataclass
 class Row:
-    """A variant in a pool, through one method: its repeats without and with pictures."""
+    """A variant in a pool, through one method on a machine: its repeats without and with pictures."""
 
     variant: str
     pool: int | None
     method: str
+    machine: str = ""
     bare: list[Run] = field(default_factory=list)
     filmed: list[Run] = field(default_factory=list)
 
@@ -54,8 +55,8 @@ class Row:
         return self._costs("steps_per_s", filmed)
 
     def pace(self, filmed: bool = False) -> list[float]:
-        """Simulated over real time of every repeat; none where one is not a result."""
-        return self._costs("simulated_to_real", filmed)
+        """Wall seconds a simulated second of every repeat; none where one is not a result."""
+        return self._costs("wall_per_simulated_s", filmed)
 
     def _costs(self, key: str, filmed: bool) -> list[float]:
         return figures({"": self.filmed if filmed else self.bare}, key).get("", [])
@@ -65,11 +66,35 @@ class Row:
         return lacking([*self.bare, *self.filmed])
 
 
-def published() -> dict[tuple[str, int], float]:
-    """(variant, particles) -> whole steps a second without pictures, as printed: steps of 1 ms, of 10 substeps each."""
-    rows = table("table2_published").to_dict("records")
-    names = {name.replace(" + ", "_"): name for name in VARIANTS}
-    return {(names[row["variant"]], int(row["particles"])): float(row["fps_headless"]) for row in rows}
+def rows_of(methods: Sequence[str], pools: Sequence[int | None]) -> list[Row]:
+    """As the paper has them: the plain tower in every pool, each other variant in the last."""
+    return [
+        Row(variant, pool, method)
+        for method in methods
+        for pool in pools
+        for variant in VARIANTS
+        if variant == "plain" or pool == pools[-1]
+    ]
+
+
+@dataclass(frozen=True)
+class Printed:
+    """What the paper has of a row: wall seconds a simulated second, mean and standard deviation of five repeats."""
+
+    particles: int
+    bare: tuple[float, float]
+    filmed: tuple[float, float]
+
+
+def printed(variant: str, pool: int | None) -> Printed:
+    """The paper's row of a variant, in the pool that is nearest to this one: 17,000 where it is as small as can be."""
+    found = table("table2_published").to_dict("records")
+    own = [row for row in found if row["variant"] == variant.replace(" + ", "_")]
+    near = min(own, key=lambda row: abs(row["particles"] - (pool or 0)))
+    bare, filmed = (
+        (float(near[f"sim_real_{kind}"]), float(near[f"sim_real_{kind}_sd"])) for kind in ("headless", "rendering")
+    )
+    return Printed(int(near["particles"]), bare, filmed)
 
 
 def check_pools(pools: Sequence[int | None], quick: bool) -> None:
@@ -82,8 +107,9 @@ def check_pools(pools: Sequence[int | None], quick: bool) -> None:
 def claims(rows: Sequence[Row]) -> list[tuple[str, str, str, str]]:
     """(method, claim, measured, verdict) of what the paper says of its own table; a verdict needs two repeats."""
     found = []
-    for method in dict.fromkeys(row.method for row in rows):
-        own = [row for row in rows if row.method == method]
+    for machine, name in dict.fromkeys((row.machine, row.method) for row in rows):
+        own = [row for row in rows if (row.machine, row.method) == (machine, name)]
+        method = f"{name}, {machine}" if len({row.machine for row in rows}) > 1 else name
         speed = {(r.variant, r.pool): r.speed() for r in own}
         pools = list(dict.fromkeys(r.pool for r in own))
         last = pools[-1]

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Unpack
+from pathlib import Path
+from typing import Any, Unpack
 
+from ..errors import UserError
+from ..runs import archive
 from ..study.result import Result
 from ..study.workplace import Options, Workplace, methods_of
-from .rows import VARIANTS, Row, check_pools
+from .rows import Row, check_pools, rows_of
 from .table2_report import report
 
 WALL_LIMIT = 1800.0  # s
+NAME = "timings"  # of what is kept
 
 
 @dataclass(repr=False)
@@ -19,6 +23,9 @@ class Table2(Result):
     """The printed tower timed: `table` has a row for each variant in each pool, see `rows` for the runs."""
 
     rows: list[Row] = field(default_factory=list)
+
+    def keep(self, folder: Path) -> None:
+        keep(self.rows, folder)
 
 
 def table2(
@@ -31,20 +38,62 @@ def table2(
 ) -> Table2:
     """Time the printed tower, feature by feature, with and without pictures; the paper's claims as verdicts.
 
-    `methods` are names, None is all. `pools`: particles to preallocate; None is as many as needed. `repeats`: runs of
-    each row, for the spread. `quick`: shorter towers. One run at a time, so that times [s] mean something. `options`
-    are those of every verb, see Options.
+    `methods` are names, None is all. `pools`: particles to preallocate; None is as many as needed. As in the paper, the
+    plain tower is run in all of them and every other in the last. `repeats`: runs of each row, for the spread. `quick`:
+    shorter towers. One run at a time, so that times [s] mean something. `options` are those of every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is.
     """
     names = methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     check_pools(pools, quick)
-    rows = [Row(variant, pool, method) for method in names for pool in pools for variant in VARIANTS]
+    rows = rows_of(names, pools)
     planned = [work for row in rows for work in row.jobs(repeats, quick, place)]
     made = iter(place.run(planned, "table2"))
     for row in rows:
         row.bare, row.filmed = ([next(made) for _ in range(repeats)] for _ in range(2))
+        row.machine = archive.where(row.bare)
+    return _told(rows, place.store.root, keeper=place.keeper)
+
+
+def published(folder: str | Path, out: str | Path | None = None) -> Table2:
+    """The table again from what studies have kept in a `folder`, or in folders inside it: nothing is run.
+
+    Raises UserError where there is none, and for one that was changed since.
+    """
+    rows = [row for place in archive.places(Path(folder).expanduser(), NAME, "table2") for row in restore(place)]
+    return _told(rows, Path(folder if out is None else out).expanduser().absolute(), kept=True)
+
+
+def _told(rows: list[Row], root: Path, **more: Any) -> Table2:
     missing = [line for row in rows for line in row.missing()]
     runs = [found for row in rows for found in (*row.bare, *row.filmed)]
-    return Table2(report(rows, place.store.root), place.store.root, runs, missing, not missing, place.keeper, rows)
+    return Table2(report(rows, root), root, runs, missing, not missing, rows=rows, **more)
+
+
+def keep(rows: Sequence[Row], folder: Path) -> None:
+    """Write the records of all runs, and which row they are of, into a folder."""
+    told = [
+        {
+            "variant": row.variant,
+            "pool": row.pool,
+            "method": row.method,
+            "bare": [run.folder.name for run in row.bare],
+            "filmed": [run.folder.name for run in row.filmed],
+        }
+        for row in rows
+    ]
+    archive.keep(folder, NAME, {"rows": told}, (run for row in rows for run in (*row.bare, *row.filmed)))
+
+
+def restore(folder: Path) -> list[Row]:
+    """The rows that a folder keeps."""
+    index, runs = archive.restore(folder, NAME)
+    try:
+        rows = []
+        for told in index["rows"]:
+            bare, filmed = ([runs[name] for name in told[kind]] for kind in ("bare", "filmed"))
+            rows.append(Row(told["variant"], told["pool"], told["method"], archive.where(bare), bare, filmed))
+        return rows
+    except (KeyError, TypeError) as error:
+        raise UserError(archive.another_edition(folder, error)) from None

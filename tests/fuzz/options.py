@@ -32,7 +32,7 @@ HAS = {
     "--solvers": ("compare", "sweep", "validate", "stability", "bench", "ablate", "select", "guide", "table2"),
     "--over": ("sweep",),
     "--worlds": ("sweep",),
-    "--from": ("table1", "guide"),
+    "--from": ("table1", "table2", "guide"),
     "--seed": ("validate", "table1"),
     "--particles": ("bench",),
     "--axis": ("stability",),

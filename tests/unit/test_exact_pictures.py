@@ -55,7 +55,9 @@ def test_colours_are_speed_while_it_moves_then_layer_or_time_of_laying():
     births = np.array([0.1, 0.5, 0.8])
     still, moving = frame(np.zeros(3), births), frame(np.full(3, 0.05), births)
     scale = views._scale([run_of(BEAD)], [still])
-    assert (scale.label, scale.limits) == ("laid at [s]", (0.0, BEAD.track.end)) and (scale.value(still) == births).all()
+    assert (scale.label, scale.limits) == ("laid at [s]", (0.0, BEAD.track.end)) and (
+        scale.value(still) == births
+    ).all()
     scale = views._scale([run_of(BEAD)], [still, moving])
     assert (scale.label, scale.limits) == ("speed [m/s]", (0.0, pytest.approx(0.05)))
     wall = load("wall")

@@ -4,8 +4,9 @@ import pytest
 
 from fluidbench.errors import UserError
 from fluidbench.method.target import Target
-from fluidbench.paper.rows import VARIANTS, Row, check_pools, claims, spread
-from fluidbench.paper.table2 import table2
+from fluidbench.paper import table2_report as page
+from fluidbench.paper.rows import VARIANTS, Printed, Row, check_pools, claims, printed, spread
+from fluidbench.paper.table2 import NAME, keep, published, table2
 from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
 from fluidbench.scenario.library import load
 
@@ -19,8 +20,9 @@ def row(variant, bare, filmed=(), pool=None):
         variant,
         pool,
         "mpm",
-        [finished(steps_per_s=s, simulated_to_real=s / 100) for s in bare],
-        [finished(steps_per_s=s, simulated_to_real=s / 100) for s in filmed],
+        "CPU",
+        [finished(steps_per_s=s, wall_per_simulated_s=s / 100) for s in bare],
+        [finished(steps_per_s=s, wall_per_simulated_s=s / 100) for s in filmed],
     )
 
 
@@ -122,12 +124,8 @@ def test_rows_of_the_tower_are_run_bare_and_filmed(tmp_path, monkeypatch):
     assert made.runs == [run for r in rows for run in (*r.bare, *r.filmed)] and (made.ok, made.missing) == (True, [])
     assert call[0].scenario == load("ring_tower", quick=True).model_dump(mode="json")
     sized = table2(["mpm", "sph"], pools=[None, 400_000], repeats=1, **more).rows
-    assert [(r.method, r.pool) for r in sized[::5]] == [
-        ("mpm", None),
-        ("mpm", 400_000),
-        ("sph", None),
-        ("sph", 400_000),
-    ]
+    assert [(r.variant, r.pool) for r in sized] == 2 * [("plain", None), *((v, 400_000) for v in VARIANTS)]
+    assert [r.method for r in sized] == ["mpm"] * 6 + ["sph"] * 6
     assert calls[-1][-1].scenario["pool"] == 400_000 and calls[-1][-1].method == "sph"
 
 
@@ -149,7 +147,7 @@ def test_speeds_of_a_row_and_their_spread():
     assert made.speed() == [90.0, 110.0] and made.speed(True) == [40.0] and made.pace() == [0.9, 1.1]
     assert made.pace(filmed=True) == [0.4]
     assert spread(made.speed()) == "100 ± 14" and spread([1.23456]) == "1.235" and spread([]) == "-"
-    lacks = Row("plain", None, "mpm", [finished(verdict="error")], [finished("sph", "timeout")])
+    lacks = Row("plain", None, "mpm", "CPU", [finished(verdict="error")], [finished("sph", "timeout")])
     assert lacks.speed() == [] and len(lacks.missing()) == 2
 
 
@@ -157,3 +155,36 @@ def test_a_pool_that_a_variant_overfills_is_refused():
     check_pools([None], True)
     with pytest.raises(UserError, match="pool = 1000 is too small"):
         check_pools([None, 1000], True)
+
+
+def test_the_papers_figures_stand_beside_ours():
+    assert printed("plain", None) == Printed(17_000, (11.7, 0.2), (15.7, 0.1))
+    assert printed("plain", 298_000) == Printed(298_000, (11.9, 0.1), (34.2, 0.1))
+    assert printed(ALL, 400_000) == Printed(298_000, (16.7, 0.1), (59.3, 0.2))
+    assert {printed(v, None).particles for v in VARIANTS if v != "plain"} == {298_000}
+    (shown,) = page._timing([row("curing", [90.0, 110.0], [40.0])]).rows
+    assert shown == [
+        "curing",
+        "mpm",
+        "as needed",
+        "10",
+        "0.1",
+        "100 ± 14",
+        "1 ± 0.14",
+        "12.6 ± 0.2",
+        "0.4",
+        "34.2 ± 0.3",
+    ]
+
+
+def test_a_timing_is_told_again_from_what_it_keeps(tmp_path):
+    made = [row("plain", [90.0, 110.0], [40.0, 41.0]), row("curing", [50.0, 51.0], [9.0, 9.5], pool=298_000)]
+    for i, run in enumerate(run for r in made for run in (*r.bare, *r.filmed)):
+        object.__setattr__(run, "folder", tmp_path / "runs" / str(i))
+    keep(made, tmp_path / "cpu")
+    again = published(tmp_path, tmp_path / "out")
+    assert again.report.files["table2.md"] == page.report(made, tmp_path).files["table2.md"]
+    assert again.ok and [r.speed() for r in again.rows] == [r.speed() for r in made] and again.save().exists()
+    (tmp_path / "cpu" / f"{NAME}.json").write_text("{}")
+    with pytest.raises(UserError, match="is not as it was written"):
+        published(tmp_path)
