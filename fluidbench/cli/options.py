@@ -228,14 +228,20 @@ def budget_of(text: str | None) -> tuple[float, float]:
         return math.inf, math.inf
     if word == "realtime":
         return math.inf, 1.0
+    return time_of(text, "--budget", " or realtime"), math.inf
+
+
+def time_of(text: str, option: str, other: str = "") -> float:
+    """'5m' -> 300.0 [s]; raises UserError for what is no time."""
+    word = text.strip().lower()
     scale = {"s": 1.0, "m": 60.0, "h": 3600.0}.get(word[-1:])
     try:
         value = float(word[:-1] if scale else word) * (scale or 1.0)
     except ValueError:
         value = -1.0
     if not SHORTEST <= value <= LONGEST:
-        raise UserError(f"--budget takes a time such as 60s, 5m or 1h, or realtime; got {quoted(text)}")
-    return value, math.inf
+        raise UserError(f"{option} takes a time such as 60s, 5m or 1h{other and ','}{other}; got {quoted(text)}")
+    return value
 
 
 def axes_of(given: list[str]) -> dict[str, list[Any]]:

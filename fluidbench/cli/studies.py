@@ -1,5 +1,6 @@
 """sweep, stability, bench, ablate, select, guide, table1 and table2: studies made of many runs."""
 
+import math
 from typing import Annotated, Any
 
 import typer
@@ -25,6 +26,7 @@ from .options import (
     placed,
     repeats_of,
     running,
+    time_of,
 )
 
 
@@ -146,6 +148,10 @@ def select(
     scenario: ScenarioName,
     tolerance: Annotated[str, typer.Option(help="largest relative error of any length, e.g. 5%")] = "5%",
     budget: Annotated[str | None, typer.Option(help="wall time of a run, e.g. 60s, or realtime; default none")] = None,
+    within: Annotated[
+        str | None,
+        typer.Option(help="time that the whole study may take, e.g. 5m: spacings are coarser, method by method"),
+    ] = None,
     solvers: Solvers = None,
     set_: Settings = None,
     spacing: Spacing = None,
@@ -156,7 +162,8 @@ def select(
 ) -> None:
     """Recommend a method, spacing and time step: least cost within a tolerance, on this machine, with the evidence.
 
-    Runs every method at four spacings. A second call, with another tolerance or budget, reuses the runs.
+    Runs every method at four spacings, on a GPU at five. A second call, with another tolerance or budget, reuses the
+    runs.
     """
     from ..study.select import select as study
 
@@ -169,6 +176,7 @@ def select(
         tolerance=share,
         budget=longest,
         pace=pace,
+        within=time_of(within, "--within") if within is not None else math.inf,
         called=scenario,
         measured=measured or (),
         **more,

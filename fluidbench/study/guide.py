@@ -14,7 +14,7 @@ from ..runs.record import Run
 from ..scenario import Scenario
 from .guide_report import report
 from .result import Result
-from .select import WALL_LIMIT, candidates
+from .select import WALL_LIMIT, candidates, shares_cores
 from .selection import Selection, assess
 from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number
 
@@ -54,8 +54,8 @@ def guide(
     side by side.
 
     `scenarios`: shipped names, TOML files or scenarios, default those of JOBS; `quick`: the shorter versions of what is
-    named; `methods` are names, default all; `tolerances`: largest relative errors of any length. One run at a time, so
-    that costs mean something. `options` are those of every verb, see Options.
+    named; `methods` are names, default all; `tolerances`: largest relative errors of any length. `options` are those of
+    every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is.
     """
@@ -64,8 +64,8 @@ def guide(
     names = methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     subjects = subjects_of(scenarios, quick)
-    planned = {job: candidates(scenario, names, place) for job, scenario in subjects.items()}
-    made = iter(place.run([work for own in planned.values() for work in own], "guide"))
+    planned = {job: candidates(scenario, names, place)[0] for job, scenario in subjects.items()}
+    made = iter(place.run([work for own in planned.values() for work in own], "guide", shares_cores(place)))
     runs = {job: [next(made) for _ in own] for job, own in planned.items()}
     studies = {archive.where(r for own in runs.values() for r in own): _assessed(runs, names)}
     return _concluded(studies, tolerances, place.store.root, keeper=place.keeper)

@@ -50,6 +50,7 @@ HAS = {
     "--executor": STUDIES,
     "--tolerance": ("ablate", "select", "guide"),
     "--budget": ("select",),
+    "--within": ("select",),
     "--colour": ("render",),
     "--pace": ("render",),
     "--solver": ("run",),
@@ -204,7 +205,29 @@ REALS = (
     "1e999",
 )
 WHOLES = ("0", "-1", "1.5", "nan", "inf", "1e300", "text", "", "true", "9" * 30, "9" * 5000, "-" + "9" * 30)
+TIMES = (
+    "nan",
+    "inf",
+    "-5",
+    "-5s",
+    "0",
+    "0s",
+    "soon",
+    "s",
+    "nans",
+    "infs",
+    "infm",
+    "1e300h",
+    "1e300",
+    "1e-300s",
+    "5d",
+    "1e999",
+    "5,5s",
+    "h",
+    "x" * 5000,
+)
 VALUES = {
+    "--within": (*TIMES, "", "none", "1s"),
     "--wall-limit": REALS,
     "--pace": (*REALS, "0"),
     "--checkpoint-every": REALS,
@@ -237,27 +260,7 @@ VALUES = {
         "5,0%",
         "2",
     ),
-    "--budget": (
-        "nan",
-        "inf",
-        "-5",
-        "-5s",
-        "0",
-        "0s",
-        "soon",
-        "s",
-        "nans",
-        "infs",
-        "infm",
-        "1e300h",
-        "1e300",
-        "1e-300s",
-        "5d",
-        "1e999",
-        "5,5s",
-        "h",
-        "x" * 5000,
-    ),
+    "--budget": TIMES,
 }
 """Numbers that are none, have no sense, or are beyond any physics."""
 MAY = {
@@ -292,7 +295,7 @@ def lists(rng: random.Random) -> Iterator[Case]:
             told = (
                 option,
                 "over",
-                "evidence.json",
+                "one folder down",
                 "xxx",
                 "solver",
                 "axis",
@@ -542,6 +545,7 @@ def legitimate(rng: random.Random) -> Iterator[Case]:
     right += [(verb, "line_bead", "--set", text) for text in sets for verb in ("compare", "run", "show")]
     right += [command("run", "--wall-limit", v) for v in ("5", "0.5", "1e5")]
     right += [command("ablate", "--tolerance", v) for v in ("5%", "5 %", "0.05", "0.9", "100%", "0.1%", " 5% ")]
+    right += [command("select", "--within", v) for v in ("10m", "600", "1h")]
     right += [command("select", "--budget", v) for v in ("60s", "realtime", "5m", "1h", "0.5s", "90")]
     right += [command("compare", "--solvers", v) for v in ("mpm", "sph,mpm", " mpm , pbd ")]
     right += [command("sweep", "--worlds", "4"), command("validate", "--seed", "4294967295")]

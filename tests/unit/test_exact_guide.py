@@ -9,6 +9,7 @@ from fluidbench.study.guide import JOBS, NAME, guide, published, subjects_of
 from fluidbench.study.guide_chart import _time, chart
 from fluidbench.study.guide_report import sentence
 from fluidbench.study.selection import Candidate, Selection, Trust
+from fluidbench.study.workplace import cores
 
 from .made import BEAD, finished, working
 
@@ -103,7 +104,7 @@ def answer(job):
 def test_a_guide_is_made_again_from_what_it_keeps(tmp_path, monkeypatch):
     calls = working(monkeypatch, answer)
     made = guide([BEAD], ["mpm", "sph"], tolerances=[0.2, 0.01], out=tmp_path / "a", progress=False)
-    assert [call.workers for call in calls] == [1] and made.ok and len(made.runs) == 8
+    assert [call.workers for call in calls] == [cores()] and made.ok and len(made.runs) == 8
     assert made.table.tolerance.tolist() == [0.01, 0.2] and made.table.met.tolist() == [False, True]
     for i, run in enumerate(made.runs):
         object.__setattr__(run, "folder", tmp_path / "a" / "runs" / str(i))

@@ -1,11 +1,13 @@
 """Selection by hand: trust, extrapolation, consensus, bias, the front, the recommendation, and how sure it is."""
 
+import importlib
 import math
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from fluidbench.errors import UserError
 from fluidbench.measure.reference import Answer
 from fluidbench.method.target import Target
 from fluidbench.study import selection as module
@@ -21,10 +23,12 @@ from fluidbench.study.selection import (
     physics_of,
     trust_of,
 )
+from fluidbench.study.workplace import cores
 
 from ..conftest import bead, scenario
 from .made import BEAD, finished, working, workplace_in
 
+verb = importlib.import_module("fluidbench.study.select")
 ALWAYS = (math.inf, math.inf)
 
 
@@ -261,17 +265,18 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
 
 def test_four_spacings_are_run_of_every_method_where_the_nozzle_allows(tmp_path):
     place = workplace_in(tmp_path, wall_limit=5.0)
-    planned = candidates(BEAD, ["mpm", "sph"], place)
+    planned, notes = candidates(BEAD, ["mpm", "sph"], place)
+    assert notes == []
     assert [(j.method, j.scenario["spacing"]) for j in planned] == [
         (m, pytest.approx(f * 1.5e-3)) for m in ("mpm", "sph") for f in (2.0, 1.5, 1.0, 0.75)
     ]
     assert {j.wall_limit for j in planned} == {5.0}
     place.target = Target("cuda:0")  # where a finer one costs little
-    assert [j.scenario["spacing"] for j in candidates(BEAD, ["mpm"], place)] == pytest.approx(
+    assert [j.scenario["spacing"] for j in candidates(BEAD, ["mpm"], place)[0]] == pytest.approx(
         [3e-3, 2.25e-3, 1.5e-3, 1.125e-3, 0.75e-3]
     )
     place.target = Target("cpu")
-    planned = candidates(BEAD.model_copy(update={"spacing": 4e-3}), ["mpm"], place)  # 8 mm do not fit twice into 12
+    planned = candidates(BEAD.model_copy(update={"spacing": 4e-3}), ["mpm"], place)[0]  # 8 mm do not fit twice into 12
     assert [j.scenario["spacing"] for j in planned] == pytest.approx([6e-3, 4e-3, 3e-3])
 
 
@@ -286,5 +291,29 @@ def test_a_selection_needs_candidates_and_every_run(tmp_path, monkeypatch, verdi
     calls = working(monkeypatch, answer)
     made = select(BEAD, "mpm", tolerance=9.0, out=tmp_path, progress=False)
     assert len(made.table) == len(made.found.candidates) == count and bool(made.missing) is lacks
-    assert made.ok is (verdict == "completed") and len(made.runs) == 4 and [call.workers for call in calls] == [1]
+    assert made.ok is (verdict == "completed") and len(made.runs) == 4 and [call.workers for call in calls] == [cores()]
     assert made.findings[1].startswith("Recommended: mpm") if count else made.findings[0].startswith("No recomm")
+
+
+def test_spacings_are_coarser_where_time_is_short(tmp_path, monkeypatch):
+    """Methods of 1 and 100 s at the scenario's spacing, a core each, and runs of no work that cost nothing to start."""
+    cost = {"mpm": 1.0, "sph": 100.0, "pbd": 1e9}
+    monkeypatch.setattr(verb, "STARTING", 0.0)
+    monkeypatch.setattr(verb, "_expected", lambda s, method: cost[method] * (s.spacing / BEAD.spacing) ** -4)
+    place = workplace_in(tmp_path, workers=2)
+    planned, notes = candidates(BEAD, ["mpm", "sph", "pbd"], place, within=90.0)
+    finest = {m: min(j.scenario["spacing"] for j in planned if j.method == m) for m in ("mpm", "sph")}
+    assert finest["mpm"] == pytest.approx(0.75 * BEAD.spacing) and len(planned) == 8
+    spent = sum(cost["sph"] * (j.scenario["spacing"] / BEAD.spacing) ** -4 for j in planned if j.method == "sph")
+    assert 60.0 / 1.05**4 < spent <= 60.0
+    assert notes == [
+        f"sph: no finer than {1e3 * finest['sph']:.3g} mm, for want of time",
+        "pbd: left out: 3 spacings take longer than its share of the time, 60 s",
+    ]
+
+
+def test_a_study_that_no_method_has_time_for_is_refused(tmp_path):
+    with pytest.raises(UserError, match=r"within 1 s: mpm: left out: 3 spacings"):
+        select(BEAD, "mpm", within=1.0, out=tmp_path, progress=False)
+    with pytest.raises(UserError, match="within: a number of at least 1 is wanted"):
+        select(BEAD, "mpm", within=0.1, out=tmp_path, progress=False)
