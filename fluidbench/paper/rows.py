@@ -8,6 +8,7 @@ from statistics import mean, stdev
 
 from ..measure.reference import table
 from ..method.verdict import lacking
+from ..runs.archive import where
 from ..runs.job import Job
 from ..runs.record import Run
 from ..scenario.layout import capacity_of
@@ -31,14 +32,18 @@ SAME, BOTTLENECK = 1.2, 0.5
 
 @dataclass
 class Row:
-    """A variant in a pool, through one method on a machine: its repeats without and with pictures."""
+    """A variant in a pool, through one method: its repeats without and with pictures, all on one machine."""
 
     variant: str
     pool: int | None
     method: str
-    machine: str = ""
     bare: list[Run] = field(default_factory=list)
     filmed: list[Run] = field(default_factory=list)
+
+    @property
+    def machine(self) -> str:
+        """In a word or two, see archive.where."""
+        return where(self.bare)
 
     def jobs(self, repeats: int, quick: bool, place: Workplace) -> list[Job]:
         """Its runs: without pictures first, then with."""

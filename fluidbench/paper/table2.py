@@ -52,7 +52,6 @@ def table2(
     made = iter(place.run(planned, "table2"))
     for row in rows:
         row.bare, row.filmed = ([next(made) for _ in range(repeats)] for _ in range(2))
-        row.machine = archive.where(row.bare)
     return _told(rows, place.store.root, keeper=place.keeper)
 
 
@@ -93,7 +92,7 @@ def restore(folder: Path) -> list[Row]:
         rows = []
         for told in index["rows"]:
             bare, filmed = ([runs[name] for name in told[kind]] for kind in ("bare", "filmed"))
-            rows.append(Row(told["variant"], told["pool"], told["method"], archive.where(bare), bare, filmed))
+            rows.append(Row(told["variant"], told["pool"], told["method"], bare, filmed))
         return rows
     except (KeyError, TypeError) as error:
         raise UserError(archive.another_edition(folder, error)) from None

@@ -57,7 +57,7 @@ def test_a_run_is_rendered_filmed_and_exported(tower):
     assert done.returncode == 0, done.stdout + done.stderr
     image = np.asarray(imageio.imread(folder / "render.png"))
     assert image.shape[:2] == (960, 1280) and image.std() > 5
-    assert imageio.get_reader(folder / "film.mp4").count_frames() == len(list(folder.glob("frame_*.npz")))
+    assert imageio.get_reader(folder / "film.mp4").count_frames() == 2.4 * 20 + 1  # in real time
     assert (folder / "paraview" / "series.pvd").read_text().count("<DataSet") >= 5
 
 

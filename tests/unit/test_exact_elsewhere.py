@@ -119,7 +119,8 @@ def test_a_comparison_is_every_method_backend_and_repeat_in_order():
 
 
 def test_a_row_of_the_comparison_holds_what_the_record_holds(tmp_path, monkeypatch):
-    monkeypatch.setattr(compare_report, "plots", lambda *_: [])
+    for drawn in ("plots", "clouds"):
+        monkeypatch.setattr(compare_report, drawn, lambda *_: [])
     run = finished(
         "sph",
         measures={"top_m": 0.5},

@@ -207,7 +207,7 @@ def test_a_table_is_printed_with_all_its_cells_and_its_note():
 def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
     def runs(speeds, **more):
         made = [
-            finished(steps_per_s=s, simulated_to_real=s / 1000, mean_dt_s=2e-4, key="k", folder=tmp_path / "r", **more)
+            finished(steps_per_s=s, wall_per_simulated_s=s / 50, mean_dt_s=2e-4, key="k", folder=tmp_path / "r", **more)
             for s in speeds
         ]
         for run in made:
@@ -224,13 +224,14 @@ def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
     ]
     made = table2_page.report(rows, tmp_path)
     assert made.tables[0].rows == [
-        ["plain", "mpm", "as needed", "1234", "0.2", "100 ± 14", "0.1 ± 0.014", "40 ± 0", "0.04 ± 0", "85"],
-        ["expansion + curing + drone", "mpm", "5000", "-", "-", "error, timeout", "-", "-", "-", "60"],
+        ["plain", "mpm", "as needed", "1234", "0.2", "100 ± 14", "2 ± 0.28", "11.7 ± 0.2", "0.8 ± 0", "15.7 ± 0.1"],
+        ["expansion + curing + drone", "mpm", "5000", "-", "-", "error, timeout", "-", "16.7 ± 0.1", "-", "59.3 ± 0.2"],
     ]
     first, second = made.data.to_dict("records")
-    assert (first["steps_per_s"], first["steps_per_s_pictures"], first["simulated_to_real"]) == (100.0, 40.0, 0.1)
+    paces = [f"{whose}wall_per_simulated_s{kind}" for whose in ("", "paper_") for kind in ("", "_pictures")]
+    assert [first[key] for key in ("steps_per_s", *paces)] == [100.0, 2.0, 0.8, 11.7, 15.7]
     assert (first["repeats"], first["bytes"], first["launches_per_substep"], second["repeats"]) == (2, 42, 4, 0)
-    assert made.machine == "cores 2" and [len(v) for v in made.runs.values()] == [4, 2]
+    assert made.machine == "CPU: cores 2" and [len(v) for v in made.runs.values()] == [4, 2]
     assert [row[:2] for row in made.tables[1].rows] == [["mpm", "cost insensitive to the pool's size"]]
     assert made.findings[0].startswith("mpm: 'cost insensitive to the pool's size': not decidable")
 

@@ -20,7 +20,6 @@ def row(variant, bare, filmed=(), pool=None):
         variant,
         pool,
         "mpm",
-        "CPU",
         [finished(steps_per_s=s, wall_per_simulated_s=s / 100) for s in bare],
         [finished(steps_per_s=s, wall_per_simulated_s=s / 100) for s in filmed],
     )
@@ -147,7 +146,7 @@ def test_speeds_of_a_row_and_their_spread():
     assert made.speed() == [90.0, 110.0] and made.speed(True) == [40.0] and made.pace() == [0.9, 1.1]
     assert made.pace(filmed=True) == [0.4]
     assert spread(made.speed()) == "100 ± 14" and spread([1.23456]) == "1.235" and spread([]) == "-"
-    lacks = Row("plain", None, "mpm", "CPU", [finished(verdict="error")], [finished("sph", "timeout")])
+    lacks = Row("plain", None, "mpm", [finished(verdict="error")], [finished("sph", "timeout")])
     assert lacks.speed() == [] and len(lacks.missing()) == 2
 
 
