@@ -102,6 +102,13 @@ From = Annotated[
         show_default=False,
     ),
 ]
+Within = Annotated[
+    str | None,
+    typer.Option(
+        help="time that the whole study may take on a CPU, e.g. 5m: spacings are coarser, method by method",
+        show_default=False,
+    ),
+]
 Shorter = Annotated[bool, typer.Option("--quick", help="the scenario's own shorter and coarser version")]
 Quick = Annotated[bool, typer.Option("--quick", help="fewer points and shorter runs: minutes instead of an hour")]
 
@@ -242,6 +249,11 @@ def time_of(text: str, option: str, other: str = "") -> float:
     if not SHORTEST <= value <= LONGEST:
         raise UserError(f"{option} takes a time such as 60s, 5m or 1h{other and ','}{other}; got {quoted(text)}")
     return value
+
+
+def within_of(text: str | None) -> float:
+    """'5m' -> 300.0 [s], None -> for ever; raises UserError for what is no time."""
+    return math.inf if text is None else time_of(text, "--within")
 
 
 def axes_of(given: list[str]) -> dict[str, list[Any]]:

@@ -1,6 +1,5 @@
 """sweep, stability, bench, ablate, select, guide, table1 and table2: studies made of many runs."""
 
-import math
 from typing import Annotated, Any
 
 import typer
@@ -16,6 +15,7 @@ from .options import (
     Shorter,
     Solvers,
     Spacing,
+    Within,
     axes_of,
     budget_of,
     count_of,
@@ -26,7 +26,7 @@ from .options import (
     placed,
     repeats_of,
     running,
-    time_of,
+    within_of,
 )
 
 
@@ -148,10 +148,7 @@ def select(
     scenario: ScenarioName,
     tolerance: Annotated[str, typer.Option(help="largest relative error of any length, e.g. 5%")] = "5%",
     budget: Annotated[str | None, typer.Option(help="wall time of a run, e.g. 60s, or realtime; default none")] = None,
-    within: Annotated[
-        str | None,
-        typer.Option(help="time that the whole study may take, e.g. 5m: spacings are coarser, method by method"),
-    ] = None,
+    within: Within = None,
     solvers: Solvers = None,
     set_: Settings = None,
     spacing: Spacing = None,
@@ -176,7 +173,7 @@ def select(
         tolerance=share,
         budget=longest,
         pace=pace,
-        within=time_of(within, "--within") if within is not None else math.inf,
+        within=within_of(within),
         called=scenario,
         measured=measured or (),
         **more,
@@ -194,6 +191,7 @@ def guide(
     tolerance: Annotated[str, typer.Option(help="largest relative errors of any length, separated by commas")] = (
         "2%,5%,10%"
     ),
+    within: Within = None,
     solvers: Solvers = None,
     quick: Shorter = False,
     *,
@@ -201,7 +199,8 @@ def guide(
 ) -> None:
     """Which method for what: the cheapest method and spacing for each job and tolerance, on this machine, as one chart.
 
-    What `select` does, for paste, concrete, foam, honey and water, or for the scenarios named: hours on a CPU.
+    What `select` does, for paste, concrete, foam, honey and water, or for the scenarios named: hours on a CPU, or as
+    long as it may take `--within`.
     """
     from ..study.guide import guide as study
     from ..study.guide import published
@@ -211,7 +210,8 @@ def guide(
     if from_ is not None:
         finish(published(from_, shares, more.get("out")))
         return
-    finish(study(scenarios or None, methods_in(solvers), tolerances=shares, quick=quick, **more))
+    limit = within_of(within)
+    finish(study(scenarios or None, methods_in(solvers), tolerances=shares, quick=quick, within=limit, **more))
 
 
 @app.command()

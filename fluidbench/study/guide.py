@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,14 +49,15 @@ def guide(
     *,
     tolerances: Sequence[float] = TOLERANCES,
     quick: bool = False,
+    within: float = math.inf,
     **options: Unpack[Options],
 ) -> Guide:
     """Say which method and spacing [m] are the cheapest [s] within each tolerance for each job: what `select` finds,
     side by side.
 
     `scenarios`: shipped names, TOML files or scenarios, default those of JOBS; `quick`: the shorter versions of what is
-    named; `methods` are names, default all; `tolerances`: largest relative errors of any length. `options` are those of
-    every verb, see Options.
+    named; `methods` are names, default all; `tolerances`: largest relative errors of any length; `within`: time [s]
+    that all of it may take on a CPU, as in `select`. `options` are those of every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is.
     """
@@ -64,10 +66,13 @@ def guide(
     names = methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     subjects = subjects_of(scenarios, quick)
-    planned = {job: candidates(scenario, names, place)[0] for job, scenario in subjects.items()}
-    made = iter(place.run([work for own in planned.values() for work in own], "guide", shares_cores(place)))
-    runs = {job: [next(made) for _ in own] for job, own in planned.items()}
-    studies = {archive.where(r for own in runs.values() for r in own): _assessed(runs, names)}
+    planned = candidates(subjects, names, place, within)
+    made = iter(place.run([job for own in planned.values() for job in own.jobs], "guide", shares_cores(place)))
+    jobs = {
+        name: assess(subjects[name], names, [next(made) for _ in own.jobs], untried=own.untried)
+        for name, own in planned.items()
+    }
+    studies = {archive.where(run for found in jobs.values() for run in found.runs): jobs}
     return _concluded(studies, tolerances, place.store.root, keeper=place.keeper)
 
 
@@ -109,15 +114,13 @@ def _concluded(studies: dict[str, dict[str, Selection]], tolerances: Sequence[fl
     return Guide(report(studies, sorted(tolerances), root), root, runs, missing, ok, studies=studies, **more)
 
 
-def _assessed(runs: Mapping[str, Sequence[Run]], methods: Sequence[str]) -> dict[str, Selection]:
-    """Every run has its scenario as it was run, but for the spacing the same."""
-    return {job: assess(own[0].scenario, methods, own) for job, own in runs.items() if own}
-
-
 def keep(jobs: Mapping[str, Selection], folder: Path) -> None:
     """Write the records of all runs, and which job they are of, into a folder."""
     index = {
-        "jobs": {job: [run.folder.name for run in found.runs] for job, found in jobs.items()},
+        "jobs": {
+            job: {"runs": [run.folder.name for run in found.runs], "untried": found.untried}
+            for job, found in jobs.items()
+        },
         "methods": list(dict.fromkeys(run.method for found in jobs.values() for run in found.runs)),
     }
     archive.keep(folder, NAME, index, (run for found in jobs.values() for run in found.runs))
@@ -127,7 +130,14 @@ def restore(folder: Path) -> dict[str, Selection]:
     """What a folder keeps, judged anew by the known answers of this edition."""
     index, runs = archive.restore(folder, NAME)
     try:
-        own = {job: [runs[name] for name in names] for job, names in index["jobs"].items()}
-        return _assessed(own, index["methods"])
+        return {job: _again(told, index["methods"], runs) for job, told in index["jobs"].items()}
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(archive.another_edition(folder, error)) from None
+
+
+def _again(told: Mapping[str, Any], methods: Sequence[str], runs: Mapping[str, Run]) -> Selection:
+    """A job's selection; every run has its scenario as it was run, but for the spacing the same."""
+    own = [runs[name] for name in told["runs"]]
+    if not own:
+        return Selection([], {}, {}, [], untried=told["untried"])
+    return assess(own[0].scenario, methods, own, untried=told["untried"])

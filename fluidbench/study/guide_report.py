@@ -127,7 +127,7 @@ def _detail(studies: Studies, found: Sequence[Choice], job: str, root: Path) -> 
         own = sorted(jobs[job].candidates, key=lambda c: c.seconds)
         tried = (f"{setting(c)}: {c.error:.1%}, {c.seconds:.3g} s" for c in own)
         made.lines.append(f"{machine}: error and time of everything tried: {'; '.join(tried)}.")
-        made.lines += [f"{machine}: {note}." for note in jobs[job].notes]
+        made.lines += [f"{machine}: {note}." for note in jobs[job].remarks]
         for run in jobs[job].runs:
             made.add_run(run, root, command_of(run) or "")
     return made

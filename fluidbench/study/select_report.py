@@ -54,7 +54,7 @@ def _findings(
 ) -> list[str]:
     best, why = chosen.recommend(tolerance, budget, pace)
     if best is None:
-        return [f"No recommendation: {why}.", *chosen.notes]
+        return [f"No recommendation: {why}.", *chosen.remarks]
     lines = [f"Tolerance {100 * tolerance:.3g} %; budget: {_budget(budget, pace)}."]
     lines.append(f"Recommended: {_words(best)}." + (f" But {why}." if why else ""))
     lines.append(
@@ -73,7 +73,7 @@ def _findings(
     lines.append(
         f"How sure: {confidence(chosen, tolerance)} (known answers: {', '.join(sorted(physics_of(scenario)))})."
     )
-    return [*lines, *chosen.notes]
+    return [*lines, *chosen.remarks]
 
 
 def _further(chosen: Selection, best: Candidate) -> str:

@@ -77,7 +77,13 @@ class Selection:
     limits: dict[str, dict[str, float]]
     runs: list[Run]
     notes: list[str] = field(default_factory=list)
+    untried: list[str] = field(default_factory=list)  # what there was no time for
     erratic: set[str] = field(default_factory=set)  # methods with a length that no line through its spacings explains
+
+    @property
+    def remarks(self) -> list[str]:
+        """What there was no time for, and what was noted of the rest."""
+        return [*self.untried, *self.notes]
 
     def missing(self) -> list[str]:
         """Runs that it wanted and has nothing of; that a method refuses is an answer."""
@@ -147,11 +153,16 @@ def trust_of(scenario: Scenario, methods: Sequence[str]) -> dict[str, Trust]:
 
 
 def assess(
-    scenario: Scenario, methods: Sequence[str], runs: Sequence[Run], measured: Sequence[Measured] = ()
+    scenario: Scenario,
+    methods: Sequence[str],
+    runs: Sequence[Run],
+    measured: Sequence[Measured] = (),
+    untried: Sequence[str] = (),
 ) -> Selection:
-    """Errors of all candidates from finished runs, against what was `measured` where that is known."""
+    """Errors of all candidates from finished runs, against what was `measured` where that is known; `untried` is what
+    there was no time for."""
     told = averages(measured)
-    result = Selection([], trust_of(scenario, methods), {}, list(runs))
+    result = Selection([], trust_of(scenario, methods), {}, list(runs), untried=list(untried))
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
         own = [r for r in runs if r.ok and r.method == method]

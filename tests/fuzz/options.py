@@ -50,7 +50,7 @@ HAS = {
     "--executor": STUDIES,
     "--tolerance": ("ablate", "select", "guide"),
     "--budget": ("select",),
-    "--within": ("select",),
+    "--within": ("select", "guide"),
     "--colour": ("render",),
     "--pace": ("render",),
     "--solver": ("run",),

@@ -7,7 +7,7 @@ from fluidbench.report.figures import figure_of
 from fluidbench.study.choice import choices
 from fluidbench.study.guide import JOBS, NAME, guide, published, subjects_of
 from fluidbench.study.guide_chart import _time, chart
-from fluidbench.study.guide_report import sentence
+from fluidbench.study.guide_report import report, sentence
 from fluidbench.study.selection import Candidate, Selection, Trust
 from fluidbench.study.workplace import cores
 
@@ -108,9 +108,12 @@ def test_a_guide_is_made_again_from_what_it_keeps(tmp_path, monkeypatch):
     assert made.table.tolerance.tolist() == [0.01, 0.2] and made.table.met.tolist() == [False, True]
     for i, run in enumerate(made.runs):
         object.__setattr__(run, "folder", tmp_path / "a" / "runs" / str(i))
+    made.studies["CPU"]["paste bead"].untried.append("pbd: left out")
+    assert "CPU: pbd: left out." not in made.report.files["guide.md"]
+    told = report(made.studies, [0.01, 0.2], tmp_path / "a").files["guide.md"]
     made.keep(tmp_path / "a")
     again = published(tmp_path, [0.2, 0.01], tmp_path / "b")
-    assert again.report.files["guide.md"] == made.report.files["guide.md"] and again.table.equals(made.table)
+    assert again.report.files["guide.md"] == told and "CPU: pbd: left out." in told and again.table.equals(made.table)
     assert again.save().exists() and not (tmp_path / "b" / f"{NAME}.json").exists()
     again.keep(tmp_path / "c")
     with pytest.raises(UserError, match="a second study of CPU"):

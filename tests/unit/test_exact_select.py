@@ -28,7 +28,7 @@ from fluidbench.study.workplace import cores
 from ..conftest import bead, scenario
 from .made import BEAD, finished, working, workplace_in
 
-verb = importlib.import_module("fluidbench.study.select")
+afford = importlib.import_module("fluidbench.study.afford")
 ALWAYS = (math.inf, math.inf)
 
 
@@ -265,19 +265,23 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
 
 def test_four_spacings_are_run_of_every_method_where_the_nozzle_allows(tmp_path):
     place = workplace_in(tmp_path, wall_limit=5.0)
-    planned, notes = candidates(BEAD, ["mpm", "sph"], place)
-    assert notes == []
-    assert [(j.method, j.scenario["spacing"]) for j in planned] == [
+
+    def planned(scenario, *methods):
+        return candidates({"bead": scenario}, methods, place)["bead"]
+
+    jobs = planned(BEAD, "mpm", "sph").jobs
+    assert planned(BEAD, "mpm").untried == []
+    assert [(j.method, j.scenario["spacing"]) for j in jobs] == [
         (m, pytest.approx(f * 1.5e-3)) for m in ("mpm", "sph") for f in (2.0, 1.5, 1.0, 0.75)
     ]
-    assert {j.wall_limit for j in planned} == {5.0}
+    assert {j.wall_limit for j in jobs} == {5.0}
     place.target = Target("cuda:0")  # where a finer one costs little
-    assert [j.scenario["spacing"] for j in candidates(BEAD, ["mpm"], place)[0]] == pytest.approx(
+    assert [j.scenario["spacing"] for j in planned(BEAD, "mpm").jobs] == pytest.approx(
         [3e-3, 2.25e-3, 1.5e-3, 1.125e-3, 0.75e-3]
     )
     place.target = Target("cpu")
-    planned = candidates(BEAD.model_copy(update={"spacing": 4e-3}), ["mpm"], place)[0]  # 8 mm do not fit twice into 12
-    assert [j.scenario["spacing"] for j in planned] == pytest.approx([6e-3, 4e-3, 3e-3])
+    coarse = planned(BEAD.model_copy(update={"spacing": 4e-3}), "mpm").jobs  # 8 mm do not fit twice into 12
+    assert [j.scenario["spacing"] for j in coarse] == pytest.approx([6e-3, 4e-3, 3e-3])
 
 
 @pytest.mark.parametrize(
@@ -295,25 +299,46 @@ def test_a_selection_needs_candidates_and_every_run(tmp_path, monkeypatch, verdi
     assert made.findings[1].startswith("Recommended: mpm") if count else made.findings[0].startswith("No recomm")
 
 
+def costing(monkeypatch, **cost):
+    """Methods of so many seconds at the scenario's spacing, and runs that cost nothing to start."""
+    monkeypatch.setattr(afford, "STARTING", 0.0)
+    monkeypatch.setattr(afford, "_expected", lambda s, method: cost[method] * (s.spacing / BEAD.spacing) ** -4)
+    return lambda jobs: sum(cost[j.method] * (j.scenario["spacing"] / BEAD.spacing) ** -4 for j in jobs)
+
+
 def test_spacings_are_coarser_where_time_is_short(tmp_path, monkeypatch):
-    """Methods of 1 and 100 s at the scenario's spacing, a core each, and runs of no work that cost nothing to start."""
-    cost = {"mpm": 1.0, "sph": 100.0, "pbd": 1e9}
-    monkeypatch.setattr(verb, "STARTING", 0.0)
-    monkeypatch.setattr(verb, "_expected", lambda s, method: cost[method] * (s.spacing / BEAD.spacing) ** -4)
+    """What MPM leaves of its 60 s goes to the others."""
+    spent = costing(monkeypatch, mpm=1.0, sph=100.0, pbd=1e9)
     place = workplace_in(tmp_path, workers=2)
-    planned, notes = candidates(BEAD, ["mpm", "sph", "pbd"], place, within=90.0)
-    finest = {m: min(j.scenario["spacing"] for j in planned if j.method == m) for m in ("mpm", "sph")}
-    assert finest["mpm"] == pytest.approx(0.75 * BEAD.spacing) and len(planned) == 8
-    spent = sum(cost["sph"] * (j.scenario["spacing"] / BEAD.spacing) ** -4 for j in planned if j.method == "sph")
-    assert 60.0 / 1.05**4 < spent <= 60.0
-    assert notes == [
+    found = candidates({"bead": BEAD}, ["mpm", "sph", "pbd"], place, within=90.0)["bead"]
+    own = {m: [j for j in found.jobs if j.method == m] for m in ("mpm", "sph")}
+    finest = {m: min(j.scenario["spacing"] for j in jobs) for m, jobs in own.items()}
+    assert finest["mpm"] == pytest.approx(0.75 * BEAD.spacing) and len(found.jobs) == 8
+    share = (180.0 - spent(own["mpm"])) / 2
+    assert share / 1.05**4 < spent(own["sph"]) <= share
+    assert found.untried == [
         f"sph: no finer than {1e3 * finest['sph']:.3g} mm, for want of time",
-        "pbd: left out: 3 spacings take longer than its share of the time, 60 s",
+        "pbd: left out: 3 spacings take longer than its share of the time",
     ]
 
 
+def test_time_is_shared_among_the_jobs_of_a_guide(tmp_path, monkeypatch):
+    spent = costing(monkeypatch, mpm=1.0, sph=100.0)
+    cheap = BEAD.model_copy(update={"spacing": 2e-3})
+    found = candidates({"a": BEAD, "b": cheap}, ["mpm", "sph"], workplace_in(tmp_path, workers=2), within=100.0)
+    used = spent([j for own in found.values() for j in own.jobs])
+    assert 200.0 / 1.05**8 < used <= 200.0 and [len(own.jobs) for own in found.values()] == [8, 8]
+    assert not any("mpm" in line for own in found.values() for line in own.untried)
+
+
+def test_what_is_refused_takes_no_time():
+    assert afford._expected(BEAD, "mpm") > 0.1
+    solid = BEAD.model_copy(update={"material": BEAD.material.model_copy(update={"yield_stress": None})})
+    assert solid.material.is_solid and afford._expected(solid, "pbd") == 0.0
+
+
 def test_a_study_that_no_method_has_time_for_is_refused(tmp_path):
-    with pytest.raises(UserError, match=r"within 1 s: mpm: left out: 3 spacings"):
+    with pytest.raises(UserError, match=r"within 1 s no method can compute 3 spacings of line_bead"):
         select(BEAD, "mpm", within=1.0, out=tmp_path, progress=False)
     with pytest.raises(UserError, match="within: a number of at least 1 is wanted"):
         select(BEAD, "mpm", within=0.1, out=tmp_path, progress=False)
