@@ -11,11 +11,13 @@ from .selection import ENOUGH
 
 STARTING = 4.0  # seconds before a run begins
 WIDER, MOST_WIDER = 1.05, 60  # spacings are widened by this factor at a time, to 18 times at most
+NEAR = (1.5, 1.25, 1.0)  # over the scenario's spacing, where it cannot be as wide as the others would have to be
 
 
 def afford(wanted: Sequence[tuple[Scenario, str]], factors: Sequence[float], seconds: float) -> list[list[Scenario]]:
     """For each scenario and method, the scenario at `factors` times its spacing, all so much wider that everything
-    together takes so long on one core [s], as estimated; none where fewer than ENOUGH spacings can be computed.
+    together takes so long on one core [s], as estimated; at NEAR ones where it cannot be that wide; none where fewer
+    than ENOUGH spacings can be computed.
 
     Everything gets an equal share, and what one leaves of its own goes to those that take longer.
     """
@@ -40,12 +42,13 @@ def spaced(scenario: Scenario, factors: Sequence[float]) -> list[Scenario]:
 
 def _finest(scenario: Scenario, method: str, factors: Sequence[float], share: float) -> list[Scenario]:
     """The finest spacings within a share of the time [s]."""
-    for i in range(MOST_WIDER):
-        found = spaced(scenario, [WIDER**i * factor for factor in factors])
-        if len(found) < ENOUGH:
-            break
-        if _cost(found, method) <= share:
-            return found
+    for ladder in (factors, NEAR):
+        for i in range(MOST_WIDER):
+            found = spaced(scenario, [WIDER**i * factor for factor in ladder])
+            if len(found) < ENOUGH:
+                break
+            if _cost(found, method) <= share:
+                return found
     return []
 
 

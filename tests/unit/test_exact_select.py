@@ -331,6 +331,22 @@ def test_time_is_shared_among_the_jobs_of_a_guide(tmp_path, monkeypatch):
     assert not any("mpm" in line for own in found.values() for line in own.untried)
 
 
+def test_spacings_lie_nearer_where_none_can_be_wide(tmp_path, monkeypatch):
+    """The bore takes 6 mm at most, so that 1.5, 1 and 0.75 times 4 mm cannot be any wider."""
+    spent = costing(monkeypatch, sph=100.0)
+    coarse = BEAD.model_copy(update={"spacing": 4e-3})
+
+    def tried(seconds):
+        jobs = candidates({"bead": coarse}, ["sph"], workplace_in(tmp_path, workers=1), seconds)["bead"].jobs
+        assert spent(jobs) <= seconds
+        return [j.scenario["spacing"] for j in jobs]
+
+    full = sum(100.0 * (f * 4 / 1.5) ** -4 for f in (1.5, 1.0, 0.75))
+    assert tried(1.001 * full) == pytest.approx([6e-3, 4e-3, 3e-3])
+    near = sum(100.0 * (f * 4 / 1.5) ** -4 for f in afford.NEAR)
+    assert near < 0.5 * full and tried(1.001 * near) == pytest.approx([4e-3 * f for f in afford.NEAR])
+
+
 def test_what_is_refused_takes_no_time():
     assert afford._expected(BEAD, "mpm") > 0.1
     solid = BEAD.model_copy(update={"material": BEAD.material.model_copy(update={"yield_stress": None})})
