@@ -88,6 +88,8 @@ def in_millimetres(title: str, values: Sequence[float]) -> tuple[str, float]:
 def label(key: str) -> str:
     """'bead_width_m' -> 'bead width [m]'."""
     words = key.split("_")
+    if words[-3:] == ["m", "per", "s"]:
+        return f"{' '.join(words[:-3])} [m/s]"
     if words[-2:] == ["per", "s"] or words[-3:] == ["per", "cpu", "s"] or words[-3:] == ["per", "simulated", "s"]:
         return " ".join(words)
     if words[-1] in UNITS and len(words) > 1:

@@ -41,6 +41,7 @@ def test_numbers_have_four_digits_and_spreads_one():
         ("steps_per_s", "steps per s"),
         ("particle_substeps_per_cpu_s", "particle substeps per cpu s"),
         ("wall_per_simulated_s", "wall per simulated s"),
+        ("creep_m_per_s", "creep [m/s]"),
         ("slump", "slump"),
         ("m", "m"),
         ("print_standing", "print standing"),
