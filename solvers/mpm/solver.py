@@ -72,7 +72,7 @@ class SolverMPM(Solver):
         FAULT_STENCIL: "a particle left the blocks of the grid within one step",
     }
 
-    typical_rate, typical_bytes = 5.0e6, 4000.0
+    typical_rate, typical_bytes = 4.0e6, 4000.0
     axes: ClassVar = (NumericalAxis("particles_per_cell", "grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-", 1 / 3),)
 
     @classmethod

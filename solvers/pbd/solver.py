@@ -85,7 +85,7 @@ class SolverPBD(Solver):
         "pull",
     )
 
-    typical_rate, typical_bytes = 2.5e5, 900.0
+    typical_rate, typical_bytes = 1.5e5, 900.0
     bounded = False
 
     @classmethod

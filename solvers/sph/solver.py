@@ -71,7 +71,7 @@ class SolverSPH(Solver):
     OWN: ClassVar = ("matter", "new_density", "state", "shift", "acceleration")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
-    typical_rate, typical_bytes = 4.0e5, 1400.0
+    typical_rate, typical_bytes = 5.0e5, 1400.0
     bare: ClassVar = {
         "density_diffusion": 0.0,
         "density_feedback": 0.0,
