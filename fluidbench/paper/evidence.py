@@ -74,10 +74,14 @@ class Evidence:
     seed: int = 0
 
     @property
+    def machine(self) -> str:
+        """What it was run on, in a word or two."""
+        return where(run for runs in self.repeats.values() for run in runs)
+
+    @property
     def label(self) -> str:
-        """What sets it apart from another study: the device, and the seed where one was given."""
-        runs = (run for runs in self.repeats.values() for run in runs)
-        return where(runs) + f", seed {self.seed}" * (self.seed > 0)
+        """What sets it apart from another study: the machine, and the seed where one was given."""
+        return self.machine + f", seed {self.seed}" * (self.seed > 0)
 
     def group(self, name: str) -> Runs:
         """One of GROUPS."""

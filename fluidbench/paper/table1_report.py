@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..report.page import anchor
 from ..report.report import Detail, Report, machine_of
@@ -18,17 +18,30 @@ from .definitions import CONFIRMED, METHODS, OPEN, REFUTED, RULES
 from .evidence import Evidence
 from .judged import cells as judged
 from .repeat import commands
-from .table1_text import DEPENDS, MARKS, WORDS, latex, markdown
+from .table1_text import DEPENDS, LOOSE, MARKS, WORDS, latex, markdown
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from ..study.trials import Trial
 
-NOTE = f"✓ {CONFIRMED}; ✗ {REFUTED}; ? open; ≠ the rule decides otherwise elsewhere, see the evidence"
+NOTE = (
+    f"✓ {CONFIRMED}; ✗ {REFUTED}; ? open; ≠ the rule decides otherwise elsewhere; ± it did when the study was made "
+    "again; see the evidence"
+)
 
 Studies = Mapping[str, Evidence]
-Place = list[tuple[str, Cell]]  # a cell in every study that has it
+
+
+class Entry(NamedTuple):
+    """A cell as one study has it, and what that was run on."""
+
+    study: str
+    machine: str
+    cell: Cell
+
+
+Place = list[Entry]  # a cell in every study that has it
 
 
 def report(studies: Studies, root: Path) -> Report:
@@ -36,7 +49,8 @@ def report(studies: Studies, root: Path) -> Report:
     found = gathered(studies)
     counts = Counter(verdict(place) for place in found)
     findings = [f"Of {len(found)} statements " + ", ".join(f"{n} {WORDS[v]}" for v, n in counts.items()) + "."]
-    findings += [sentence(place) for place in found if verdict(place) in (OPEN, DEPENDS)]
+    findings += repeated(found)
+    findings += [sentence(place) for place in found if verdict(place) in (OPEN, DEPENDS, LOOSE)]
     scenario = next(iter(studies.values())).scenario.name
     shown = matrix(found, len(studies) > 1)
     again = {label: commands(e) for label, e in studies.items()}
@@ -61,23 +75,43 @@ def gathered(studies: Studies) -> list[Place]:
     found: dict[tuple[str, str, str], Place] = {}
     for label, e in studies.items():
         for cell in judged(e):
-            found.setdefault(cell.place, []).append((label, cell))
+            found.setdefault(cell.place, []).append(Entry(label, e.machine, cell))
     return list(found.values())
 
 
 def verdict(place: Place) -> str:
-    """What all studies and conditions say; open where one study is."""
-    if any(cell.verdict == OPEN for _, cell in place):
+    """What all studies and conditions say; open where one study is, not robust where one that was made again on the
+    same kind of machine says otherwise."""
+    if any(entry.cell.verdict == OPEN for entry in place):
         return OPEN
-    same = len({cell.verdict for _, cell in place}) == 1 and not any(cell.differs for _, cell in place)
-    return place[0][1].verdict if same else DEPENDS
+    if any(changed(place, machine) for machine in {entry.machine for entry in place}):
+        return LOOSE
+    same = len({entry.cell.verdict for entry in place}) == 1 and not any(entry.cell.differs for entry in place)
+    return place[0].cell.verdict if same else DEPENDS
+
+
+def changed(place: Place, machine: str) -> bool:
+    """Whether studies of one kind of machine disagree."""
+    return len({entry.cell.verdict for entry in place if entry.machine == machine}) > 1
+
+
+def repeated(found: Sequence[Place]) -> list[str]:
+    """For each kind of machine that was studied more than once, what came out otherwise."""
+    lines = []
+    studies = dict.fromkeys((entry.machine, entry.study) for place in found for entry in place)
+    for machine, times in Counter(machine for machine, _ in studies).items():
+        if times > 1:
+            loose = [place[0].cell.name for place in found if changed(place, machine)]
+            names = f": {'; '.join(loose)}" if loose else ""
+            lines.append(f"{machine}, studied {times} times: {len(loose)} of {len(found)} verdicts changed{names}.")
+    return lines
 
 
 def sentence(place: Place) -> str:
     """A cell as a finding."""
-    first = place[0][1]
-    told = [f"{f'{label}: ' if len(place) > 1 else ''}{c.verdict}. {c.measured}" for label, c in place]
-    differs = [f" But {v}: {_in(label, place)}{where}." for label, c in place for where, v in c.differs.items()]
+    first = place[0].cell
+    told = [f"{f'{label}: ' if len(place) > 1 else ''}{c.verdict}. {c.measured}" for label, _, c in place]
+    differs = [f" But {v}: {_in(label, place)}{where}." for label, _, c in place for where, v in c.differs.items()]
     return f"{first.name}: {'; '.join(told)}.{''.join(differs)}"
 
 
@@ -89,28 +123,28 @@ def _in(label: str, place: Place) -> str:
 def matrix(found: Sequence[Place], several: bool) -> Table:
     """The paper's rows, methods as columns; in a cell each statement with its mark, and under it what was measured."""
     table = Table("Table I, by measurement", ["", *METHODS], note=NOTE, text=True)
-    for row in dict.fromkeys(place[0][1].row for place in found):
+    for row in dict.fromkeys(place[0].cell.row for place in found):
         columns = []
         for method in METHODS:
-            own = [place for place in found if (place[0][1].row, place[0][1].method) == (row, method)]
+            own = [place for place in found if (place[0].cell.row, place[0].cell.method) == (row, method)]
             columns.append([line for place in own for line in _statement(place, several)])
         table.rows.append([row, *columns])
     return table
 
 
 def _statement(place: Place, several: bool) -> list[str]:
-    cell = place[0][1]
+    cell = place[0].cell
     head = Link(f"{MARKS[verdict(place)]} {cell.statement}", f"#{anchor(cell.name)}")
     if not several:
         return [head, f"  {cell.brief}"]
-    return [head, *(f"  {MARKS[c.verdict]} {label}: {c.brief}" for label, c in place)]
+    return [head, *(f"  {MARKS[c.verdict]} {label}: {c.brief}" for label, _, c in place)]
 
 
 def _detail(place: Place, again: Mapping[str, Mapping[str, str]], root: Path) -> Detail:
     """What stands behind a cell: per study what was measured, what the verdict hangs on, and the runs."""
-    first = place[0][1]
+    first = place[0].cell
     made = Detail(f"{MARKS[verdict(place)]} {first.name}", anchor(first.name))
-    for label, cell in place:
+    for label, _, cell in place:
         made.lines.append(f"{label}: {cell.verdict}. {cell.measured}.")
         if cell.sensitivity:
             made.lines.append(f"What it hangs on: {cell.sensitivity}.")
@@ -137,7 +171,7 @@ def _data(found: Sequence[Place]) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
-    for label, cell in chain.from_iterable(found):
+    for label, _, cell in chain.from_iterable(found):
         row = {k: v for k, v in vars(cell).items() if k not in ("runs", "elsewhere")}
         elsewhere = "; ".join(f"{where}: {v}" for where, v in cell.elsewhere.items())
         folders = " ".join(run.folder.name for run in cell.runs)

@@ -10,9 +10,9 @@ from . import PAPER
 from .definitions import CONFIRMED, OPEN, REFUTED
 from .repeat import VALIDATE
 
-DEPENDS = "depends on where"
-MARKS = {CONFIRMED: "✓", REFUTED: "✗", OPEN: "?", DEPENDS: "≠"}
-WORDS = {CONFIRMED: "confirmed", REFUTED: "refuted", OPEN: "open", DEPENDS: "depends"}  # where signs cannot be set
+DEPENDS, LOOSE = "depends on where", "not robust"
+MARKS = {CONFIRMED: "✓", REFUTED: "✗", OPEN: "?", DEPENDS: "≠", LOOSE: "±"}
+WORDS = {**{v: v for v in MARKS}, OPEN: "open", DEPENDS: "depends"}  # where signs cannot be set
 
 
 def markdown(table: Table, findings: Sequence[str], details: Sequence[Detail], machines: Sequence[str]) -> str:

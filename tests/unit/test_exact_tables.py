@@ -244,7 +244,7 @@ def test_the_page_of_the_table_counts_its_verdicts(tmp_path):
         object.__setattr__(run, "folder", tmp_path / "runs" / "x")
     made = table1_page.report({"here": e}, tmp_path)
     found = judged.cells(e)
-    counts = Counter(table1_page.verdict([("here", c)]) for c in found)
+    counts = Counter(table1_page.verdict([table1_page.Entry("here", "CPU", c)]) for c in found)
     words = ", ".join(f"{n} {table1_page.WORDS[v]}" for v, n in counts.items())
     assert made.findings[0] == f"Of {len(found)} statements {words}."
     assert len(made.findings) == 1 + counts[definitions.OPEN] + counts[table1_page.DEPENDS]
@@ -262,14 +262,20 @@ def _heads(table, found):
     return [heads[f"#{anchor(c.name)}"] for c in found]
 
 
+def placed(studies):
+    return {place[0].cell.place: place for place in table1_page.gathered(studies)}
+
+
 def test_studies_that_disagree_are_said_to(tmp_path):
     studies = {
         "CPU": evidence(repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)),
         "GPU": evidence(repeats=repeated(mpm=2.0, sph=8.0, pbd=4.0)),
     }
-    places = {place[0][1].place: place for place in table1_page.gathered(studies)}
+    for run in studies["GPU"].runs():
+        change(run, machine={"device": "GPU"})
+    places = placed(studies)
     low, high = places["cost", "at equal spacing", "pbd"], places["cost", "at equal spacing", "sph"]
-    assert [c.verdict for _, c in low] == ["confirmed", "refuted"]
+    assert [entry.cell.verdict for entry in low] == ["confirmed", "refuted"]
     assert table1_page.verdict(low) == table1_page.DEPENDS and table1_page.verdict(high) == "confirmed"
     made = table1_page.report(studies, tmp_path)
     assert sorted(set(made.data.study)) == ["CPU", "GPU"]
@@ -277,6 +283,23 @@ def test_studies_that_disagree_are_said_to(tmp_path):
     text, tex = made.files["table1.md"], made.files["table1.tex"]
     assert "≠ low, at equal spacing<br>  ✓ CPU: 2 s a simulated s<br>  ✗ GPU: 4 s a simulated s" in text
     assert r"[depends] low, at equal spacing \newline [confirmed] CPU: 2 s" in tex and "✓" not in tex
+    assert not any("studied" in line for line in made.findings)
+
+
+def test_what_changes_when_a_study_is_made_again_is_not_robust(tmp_path):
+    studies = {
+        "CPU": evidence(repeats=repeated(mpm=4.0, sph=8.0, pbd=2.0)),
+        "CPU, seed 1": evidence(repeats=repeated(mpm=2.0, sph=8.0, pbd=4.0)),
+    }
+    places = placed(studies)
+    low, high = places["cost", "at equal spacing", "pbd"], places["cost", "at equal spacing", "sph"]
+    assert table1_page.verdict(low) == table1_page.LOOSE and table1_page.verdict(high) == "confirmed"
+    made = table1_page.report(studies, tmp_path)
+    again = next(line for line in made.findings if "studied 2 times" in line)
+    loose = [place[0].cell.name for place in places.values() if table1_page.verdict(place) == table1_page.LOOSE]
+    assert again == f"CPU, studied 2 times: {len(loose)} of {len(places)} verdicts changed: {'; '.join(loose)}."
+    assert "± low, at equal spacing<br>  ✓ CPU: 2 s" in made.files["table1.md"]
+    assert "[not robust] low, at equal spacing" in made.files["table1.tex"]
 
 
 def test_the_page_of_stability_draws_limits_and_marks_what_has_none():
