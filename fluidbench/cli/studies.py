@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..errors import UserError
 from .app import app, finish
 from .options import (
     From,
@@ -206,10 +207,14 @@ def guide(
     from ..study.guide import published
 
     shares = [fraction(text) for text in names_in(tolerance, "--tolerance", "tolerance")]
-    more = placed(options, "guide")
     if from_ is not None:
-        finish(published(from_, shares, more.get("out")))
+        if scenarios or solvers or within or quick:
+            raise UserError(
+                "--from chooses again from what is kept: it takes no scenarios, --solvers, --within or --quick"
+            )
+        finish(published(from_, shares, placed(options, "guide-published").get("out")))
         return
+    more = placed(options, "guide")
     limit = within_of(within)
     finish(study(scenarios or None, methods_in(solvers), tolerances=shares, quick=quick, within=limit, **more))
 

@@ -8,7 +8,6 @@ from statistics import mean, stdev
 
 from ..measure.reference import table
 from ..method.verdict import lacking
-from ..runs.archive import where
 from ..runs.job import Job
 from ..runs.record import Run
 from ..scenario.layout import capacity_of
@@ -39,11 +38,7 @@ class Row:
     method: str
     bare: list[Run] = field(default_factory=list)
     filmed: list[Run] = field(default_factory=list)
-
-    @property
-    def machine(self) -> str:
-        """In a word or two, see archive.where."""
-        return where(self.bare)
+    machine: str = ""  # in a word or two, see archive.where
 
     def jobs(self, repeats: int, quick: bool, place: Workplace) -> list[Job]:
         """Its runs: without pictures first, then with."""
@@ -54,6 +49,11 @@ class Row:
             for variant, every in (("", None), ("pictures", PICTURE))
             for r in range(repeats)
         ]
+
+    @property
+    def duration(self) -> float | None:
+        """What was simulated [s]; None where nothing was run."""
+        return next((run.record.input["duration"] for run in self.bare if run.record.input), None)
 
     def speed(self, filmed: bool = False) -> list[float]:
         """Steps a second of every repeat; none where one is not a result."""
@@ -72,13 +72,14 @@ class Row:
 
 
 def rows_of(methods: Sequence[str], pools: Sequence[int | None]) -> list[Row]:
-    """As the paper has them: the plain tower in every pool, each other variant in the last."""
+    """As the paper has them: the plain tower in every pool, each other variant in the largest."""
+    sizes = sorted(set(pools), key=lambda pool: pool or 0)
     return [
         Row(variant, pool, method)
         for method in methods
-        for pool in pools
+        for pool in sizes
         for variant in VARIANTS
-        if variant == "plain" or pool == pools[-1]
+        if variant == "plain" or pool == sizes[-1]
     ]
 
 
@@ -116,7 +117,7 @@ def claims(rows: Sequence[Row]) -> list[tuple[str, str, str, str]]:
         own = [row for row in rows if (row.machine, row.method) == (machine, name)]
         method = f"{name}, {machine}" if len({row.machine for row in rows}) > 1 else name
         speed = {(r.variant, r.pool): r.speed() for r in own}
-        pools = list(dict.fromkeys(r.pool for r in own))
+        pools = sorted({r.pool for r in own}, key=lambda pool: pool or 0)
         last = pools[-1]
         found.append((method, "cost insensitive to the pool's size", *_insensitive(speed, pools)))
         if enough := [v for v in VARIANTS if len(speed.get((v, last), [])) > 1]:

@@ -11,7 +11,7 @@ from ..errors import UserError
 from ..runs import archive
 from ..study.result import Result
 from ..study.workplace import Options, Workplace, methods_of
-from .rows import Row, check_pools, rows_of
+from .rows import Row, check_pools, printed, rows_of
 from .table2_report import report
 
 WALL_LIMIT = 1800.0  # s
@@ -39,8 +39,9 @@ def table2(
     """Time the printed tower, feature by feature, with and without pictures; the paper's claims as verdicts.
 
     `methods` are names, None is all. `pools`: particles to preallocate; None is as many as needed. As in the paper, the
-    plain tower is run in all of them and every other in the last. `repeats`: runs of each row, for the spread. `quick`:
-    shorter towers. One run at a time, so that times [s] mean something. `options` are those of every verb, see Options.
+    plain tower is run in all of them and every other in the largest. `repeats`: runs of each row, for the spread.
+    `quick`: shorter towers. One run at a time, so that times [s] mean something. `options` are those of every verb, see
+    Options.
 
     Raises UserError for what cannot be run, before anything is.
     """
@@ -52,16 +53,32 @@ def table2(
     made = iter(place.run(planned, "table2"))
     for row in rows:
         row.bare, row.filmed = ([next(made) for _ in range(repeats)] for _ in range(2))
+    machine = archive.where(run for row in rows for run in row.bare)
+    for row in rows:
+        row.machine = machine
     return _told(rows, place.store.root, keeper=place.keeper)
 
 
 def published(folder: str | Path, out: str | Path | None = None) -> Table2:
     """The table again from what studies have kept in a `folder`, or in folders inside it: nothing is run.
 
-    Raises UserError where there is none, and for one that was changed since.
+    Raises UserError where there is none, for one that was changed since, and for studies that cannot stand side
+    by side.
     """
-    rows = [row for place in archive.places(Path(folder).expanduser(), NAME, "table2") for row in restore(place)]
+    rows: list[Row] = []
+    for place in archive.places(Path(folder).expanduser(), NAME, "table2"):
+        _add(rows, restore(place), place)
     return _told(rows, Path(folder if out is None else out).expanduser().absolute(), kept=True)
+
+
+def _add(rows: list[Row], more: Sequence[Row], place: Path) -> None:
+    """Put the rows of one more study beside those of others; raises UserError for a second one of the same machine, and
+    for one of other towers."""
+    if {row.machine for row in rows} & {row.machine for row in more}:
+        raise UserError(f"{archive.shown(place)}: a second study of {more[0].machine}; each machine is shown once")
+    if rows and more and rows[0].duration != more[0].duration:
+        raise UserError(f"{archive.shown(place)}: its towers are not those of the other studies")
+    rows += more
 
 
 def _told(rows: list[Row], root: Path, **more: Any) -> Table2:
@@ -89,10 +106,11 @@ def restore(folder: Path) -> list[Row]:
     """The rows that a folder keeps."""
     index, runs = archive.restore(folder, NAME)
     try:
-        rows = []
+        rows, machine = [], archive.where(runs.values())
         for told in index["rows"]:
             bare, filmed = ([runs[name] for name in told[kind]] for kind in ("bare", "filmed"))
-            rows.append(Row(told["variant"], told["pool"], told["method"], bare, filmed))
+            rows.append(Row(told["variant"], told["pool"], told["method"], bare, filmed, machine))
+            printed(told["variant"], told["pool"])
         return rows
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise UserError(archive.another_edition(folder, error)) from None

@@ -55,9 +55,11 @@ def shown(folder: Path) -> str:
 
 
 def where(runs: Iterable[Run]) -> str:
-    """The machine in a word or two: its GPU, or CPU; and what wrote its kernels, where that is not the default."""
+    """The machine in a word or two: its GPU (as it was asked for, where nothing was run), or CPU; and what wrote its
+    kernels, where that is not the default."""
     records = [run.record for run in runs]
-    device = next((r.machine["device"] for r in records if "device" in r.machine), "CPU")
+    asked = next((r.device for r in records if r.device != "cpu"), "CPU")
+    device = next((r.machine["device"] for r in records if "device" in r.machine), asked)
     backend = next((r.backend for r in records), DEFAULT_BACKEND)
     return device + f", {backend}" * (backend != DEFAULT_BACKEND)
 

@@ -1,8 +1,9 @@
-"""Spacings that a study has time for, where it may take so long and no longer."""
+"""Spacings that a study tries: those that a scenario can have, and that there is time for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
 
 from ..registry import get_method
 from ..scenario import Scenario
@@ -11,26 +12,30 @@ from .selection import ENOUGH
 
 STARTING = 4.0  # seconds before a run begins
 WIDER, MOST_WIDER = 1.05, 60  # spacings are widened by this factor at a time, to 18 times at most
-NEAR = (1.5, 1.25, 1.0)  # over the scenario's spacing, where it cannot be as wide as the others would have to be
+NARROW = ((1.5, 1.25, 1.0), (1.0, 0.85, 0.7))  # over the scenario's spacing, where it cannot be as wide as is wanted
+
+
+def spacings(scenario: Scenario, factors: Sequence[float]) -> list[Scenario]:
+    """The scenario at so many times its spacing, where it can have that; at NARROW ones where that leaves fewer than
+    ENOUGH; none where those do, too."""
+    return next((found for ladder in (factors, *NARROW) if len(found := _spaced(scenario, ladder)) >= ENOUGH), [])
 
 
 def afford(wanted: Sequence[tuple[Scenario, str]], factors: Sequence[float], seconds: float) -> list[list[Scenario]]:
-    """For each scenario and method, the scenario at `factors` times its spacing, all so much wider that everything
-    together takes so long on one core [s], as estimated; at NEAR ones where it cannot be that wide; none where fewer
-    than ENOUGH spacings can be computed.
+    """For each scenario and method its `spacings`, all so much wider that everything together takes so long on one core
+    [s], as estimated; none where ENOUGH of them would take longer than their share.
 
     Everything gets an equal share, and what one leaves of its own goes to those that take longer.
     """
     found: dict[int, list[Scenario]] = {}
     left = seconds
-    for i in sorted(range(len(wanted)), key=lambda i: _cost(spaced(wanted[i][0], factors), wanted[i][1])):
+    for i in sorted(range(len(wanted)), key=lambda i: _cost(spacings(wanted[i][0], factors), wanted[i][1])):
         found[i] = _finest(*wanted[i], factors, left / (len(wanted) - len(found)))
         left -= _cost(found[i], wanted[i][1])
     return [found[i] for i in range(len(wanted))]
 
 
-def spaced(scenario: Scenario, factors: Sequence[float]) -> list[Scenario]:
-    """The scenario at so many times its spacing, where it can have that."""
+def _spaced(scenario: Scenario, factors: Sequence[float]) -> list[Scenario]:
     found = []
     for factor in factors:
         try:
@@ -41,15 +46,22 @@ def spaced(scenario: Scenario, factors: Sequence[float]) -> list[Scenario]:
 
 
 def _finest(scenario: Scenario, method: str, factors: Sequence[float], share: float) -> list[Scenario]:
-    """The finest spacings within a share of the time [s]."""
-    for ladder in (factors, NEAR):
-        for i in range(MOST_WIDER):
-            found = spaced(scenario, [WIDER**i * factor for factor in ladder])
-            if len(found) < ENOUGH:
-                break
-            if _cost(found, method) <= share:
-                return found
-    return []
+    """The finest spacings within a share of the time [s]: of `factors`, or else of the first NARROW ones."""
+    return next((found for f in (factors, *NARROW) if (found := _widened(scenario, method, f, share))), [])
+
+
+def _widened(scenario: Scenario, method: str, factors: Sequence[float], share: float) -> list[Scenario]:
+    def wider(i: int) -> list[Scenario]:
+        return _spaced(scenario, [WIDER**i * factor for factor in factors])
+
+    most = _first(MOST_WIDER, lambda i: len(wider(i)) < ENOUGH)
+    i = _first(most, lambda i: _cost(wider(i), method) <= share)
+    return wider(i) if i < most else []
+
+
+def _first(count: int, holds: Callable[[int], bool]) -> int:
+    """The first of so many from which on something holds; `count` where it never does."""
+    return bisect_left(range(count), True, key=holds)
 
 
 def _cost(scenarios: Sequence[Scenario], method: str) -> float:

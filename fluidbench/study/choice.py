@@ -48,7 +48,7 @@ def choices(studies: Mapping[str, Mapping[str, Selection]], tolerances: Sequence
 
 def _choice(job: str, machine: str, tolerance: float, found: Selection) -> Choice:
     best, why = found.recommend(tolerance, math.inf, math.inf)
-    sure = confidence(found, tolerance)
+    sure = confidence(found, tolerance, best)
     return Choice(job, machine, tolerance, best, why, sure, _change(found, tolerance, best) if best else "")
 
 
@@ -56,7 +56,7 @@ def _change(found: Selection, tolerance: float, best: Candidate) -> str:
     """The nearest rival, and another choice where a method's bias is doubted."""
     within = [c for c in found.candidates if c.error <= tolerance]
     if not within:
-        return f"a finer spacing than was tried, or a tolerance of {best.error:.0%}"
+        return f"{_finer(found, tolerance, best)}a tolerance of {math.ceil(1000 * best.error) / 10:.3g} %"
     parts = []
     rivals = [c for c in within if c.method != best.method]
     if rivals:
@@ -68,12 +68,17 @@ def _change(found: Selection, tolerance: float, best: Candidate) -> str:
         others = [c for c in found.candidates if c.method != best.method]
         near = min(others, key=lambda c: c.error, default=None)
         parts.append("no other method was judged" if near is None else f"{setting(near)} is {near.error:.0%} off")
-    unbiased = [c for c in found.candidates if c.discretisation <= tolerance]
+    unbiased = [c for c in found.candidates if c.unbiased <= tolerance]
     other = min(unbiased, key=lambda c: c.seconds)
     if other.method != best.method:
         saved = f"{setting(other)} at {other.seconds / best.seconds:.2g} of the time"
         parts.append(f"{saved}, if its own limit is the right one ({other.bias:.0%} from the consensus)")
     return "; ".join(parts)
+
+
+def _finer(found: Selection, tolerance: float, best: Candidate) -> str:
+    """Whether a finer spacing would be within the tolerance."""
+    return "a finer spacing than was tried, or " if best.bias < tolerance and found.converges(best.method) else ""
 
 
 def setting(c: Candidate) -> str:

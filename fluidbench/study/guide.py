@@ -61,35 +61,38 @@ def guide(
 
     Raises UserError for what cannot be run, before anything is.
     """
-    for one in tolerances:
-        require_number(one, "tolerance", 1e-6)
+    wanted = tolerances_of(tolerances)
     names = methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     subjects = subjects_of(scenarios, quick)
     planned = candidates(subjects, names, place, within)
     made = iter(place.run([job for own in planned.values() for job in own.jobs], "guide", shares_cores(place)))
     jobs = {
-        name: assess(subjects[name], names, [next(made) for _ in own.jobs], untried=own.untried)
+        name: assess(subjects[name], names, [next(made) for _ in own.jobs], subjects[name].measured, own.untried)
         for name, own in planned.items()
     }
     studies = {archive.where(run for found in jobs.values() for run in found.runs): jobs}
-    return _concluded(studies, tolerances, place.store.root, keeper=place.keeper)
+    return _concluded(studies, wanted, place.store.root, keeper=place.keeper)
 
 
 def published(folder: str | Path, tolerances: Sequence[float] = TOLERANCES, out: str | Path | None = None) -> Guide:
     """Choose again from what studies have kept in a `folder`, or in folders inside it: nothing is run.
 
-    Raises UserError where there is none, and for one that was changed since.
+    Raises UserError where there is none, for one that was changed since, and for studies of different scenarios.
     """
+    wanted = tolerances_of(tolerances)
     studies: dict[str, dict[str, Selection]] = {}
     for place in archive.places(Path(folder).expanduser(), NAME, "guide"):
         jobs = restore(place)
         machine = archive.where(run for found in jobs.values() for run in found.runs)
         if machine in studies:
             raise UserError(f"{archive.shown(place)}: a second study of {machine}; each machine is shown once")
+        for job, found in ((j, f) for other in studies.values() for j, f in other.items() if j in jobs):
+            if _subject(found) != _subject(jobs[job]):
+                raise UserError(f"{archive.shown(place)}: {job} is another scenario than elsewhere")
         studies[machine] = jobs
     root = Path(folder if out is None else out).expanduser().absolute()
-    return _concluded(studies, tolerances, root, kept=True)
+    return _concluded(studies, wanted, root, kept=True)
 
 
 def subjects_of(scenarios: Sequence[Scenario | str | Path] | None, quick: bool) -> dict[str, Scenario]:
@@ -110,18 +113,38 @@ def _concluded(studies: dict[str, dict[str, Selection]], tolerances: Sequence[fl
     selections = [found for jobs in studies.values() for found in jobs.values()]
     runs = [run for found in selections for run in found.runs]
     missing = lacking(runs, refusals=False)
-    ok = all(found.candidates for found in selections)
-    return Guide(report(studies, sorted(tolerances), root), root, runs, missing, ok, studies=studies, **more)
+    ok = all(found.candidates for found in selections) and not missing
+    return Guide(report(studies, tolerances, root, missing), root, runs, missing, ok, studies=studies, **more)
+
+
+def tolerances_of(given: Any) -> list[float]:
+    """From the least to the largest; raises UserError for what is none."""
+    found = [given] if isinstance(given, int | float) else list(given)
+    for one in found:
+        require_number(one, "tolerance", 1e-6)
+    if not found:
+        raise UserError("tolerances: at least one is wanted")
+    return sorted(set(found))
+
+
+def _subject(found: Selection) -> str:
+    """What it is a study of, spacing and chance apart."""
+    alike = {"spacing": 1.0, "seed": 0, "jitter": 0.0}
+    return found.scenario.model_copy(update=alike).model_dump_json() if found.scenario else ""
 
 
 def keep(jobs: Mapping[str, Selection], folder: Path) -> None:
     """Write the records of all runs, and which job they are of, into a folder."""
     index = {
         "jobs": {
-            job: {"runs": [run.folder.name for run in found.runs], "untried": found.untried}
+            job: {
+                "scenario": found.scenario and found.scenario.model_dump(mode="json"),
+                "runs": [run.folder.name for run in found.runs],
+                "untried": found.untried,
+            }
             for job, found in jobs.items()
         },
-        "methods": list(dict.fromkeys(run.method for found in jobs.values() for run in found.runs)),
+        "methods": list(dict.fromkeys(method for found in jobs.values() for method in found.trust)),
     }
     archive.keep(folder, NAME, index, (run for found in jobs.values() for run in found.runs))
 
@@ -136,8 +159,6 @@ def restore(folder: Path) -> dict[str, Selection]:
 
 
 def _again(told: Mapping[str, Any], methods: Sequence[str], runs: Mapping[str, Run]) -> Selection:
-    """A job's selection; every run has its scenario as it was run, but for the spacing the same."""
-    own = [runs[name] for name in told["runs"]]
-    if not own:
-        return Selection([], {}, {}, [], untried=told["untried"])
-    return assess(own[0].scenario, methods, own, untried=told["untried"])
+    """A job's selection, assessed anew."""
+    scenario = Scenario.model_validate(told["scenario"])
+    return assess(scenario, methods, [runs[name] for name in told["runs"]], scenario.measured, told["untried"])

@@ -19,12 +19,13 @@ CHART = "guide"
 RULE = (
     "The cheapest setting whose error, that of the worst length, is within the tolerance: what is left of its spacing, "
     "and how far its method's limit at zero spacing lies from the mean of the methods that pass most known answers of "
-    "the job's physics; against the exact answer where there is one. Time is one core's of a CPU, wall time on a GPU."
+    "the job's physics; against the exact answer where there is one, or what was measured. Time is CPU time on one "
+    "core, wall time on several and on a GPU."
 )
 
 
-def report(studies: Studies, tolerances: Sequence[float], root: Path) -> Report:
-    """`studies` by machine and job."""
+def report(studies: Studies, tolerances: Sequence[float], root: Path, missing: Sequence[str] = ()) -> Report:
+    """`studies` by machine and job; `missing` are runs that it has nothing of."""
     import pandas as pd
 
     found = choices(studies, tolerances)
@@ -40,11 +41,12 @@ def report(studies: Studies, tolerances: Sequence[float], root: Path) -> Report:
         findings,
         [shown],
         pd.DataFrame([_row(c) for c in found]),
+        failures=list(missing),
         notes=[RULE],
         images=[Image(CHART, title, "; ".join(findings), partial(chart, found))],
         details=details,
         machine="; ".join(made),
-        files={"guide.md": _markdown(shown, findings, details, made)},
+        files={"guide.md": _markdown(shown, findings, details, [*made, *missing])},
     )
 
 
@@ -122,11 +124,14 @@ def _detail(studies: Studies, found: Sequence[Choice], job: str, root: Path) -> 
     for machine, jobs in studies.items():
         if job not in jobs:
             continue
-        sure = dict.fromkeys(c.sure for c in found if (c.job, c.machine) == (job, machine))
-        made.lines += [f"{machine}: confidence {line}." for line in sure]
+        sure: dict[str, list[Choice]] = {}
+        for c in found:
+            if (c.job, c.machine) == (job, machine):
+                sure.setdefault(c.sure, []).append(c)
+        made.lines += [f"{machine}, within {_percents(cs)}: confidence {line}." for line, cs in sure.items()]
         own = sorted(jobs[job].candidates, key=lambda c: c.seconds)
         tried = (f"{setting(c)}: {c.error:.1%}, {c.seconds:.3g} s" for c in own)
-        made.lines.append(f"{machine}: error and time of everything tried: {'; '.join(tried)}.")
+        made.lines += [f"{machine}: error and time of everything tried: {'; '.join(tried)}."] if own else []
         made.lines += [f"{machine}: {note}." for note in jobs[job].remarks]
         for run in jobs[job].runs:
             made.add_run(run, root, command_of(run) or "")

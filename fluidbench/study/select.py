@@ -12,11 +12,11 @@ from ..errors import UserError
 from ..runs.job import Job
 from ..scenario import Scenario
 from ..scenario.measured import Measured
-from .afford import afford, spaced
+from .afford import afford, spacings
 from .result import Result
 from .select_report import report
 from .selection import ENOUGH, FACTORS, FINEST, Selection, assess
-from .workplace import Options, Workplace, as_scenario, measured_of, methods_of, require_number
+from .workplace import Options, Workplace, as_scenario, cores, measured_of, methods_of, require_number
 
 WALL_LIMIT = 900.0  # s
 
@@ -63,7 +63,7 @@ def select(
     resolved, names = as_scenario(scenario), methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     beside = measured_of(resolved, measured)
-    planned = candidates({resolved.name: resolved}, names, place, within)[resolved.name]
+    (planned,) = candidates({resolved.name: resolved}, names, place, within).values()
     runs = place.run(planned.jobs, "select", together=shares_cores(place))
     found = assess(resolved, names, runs, beside, planned.untried)
     made = report(resolved, called or resolved.name, found, tolerance, budget, pace, place.store.root)
@@ -80,17 +80,23 @@ def shares_cores(place: Workplace) -> bool:
 def candidates(
     subjects: Mapping[str, Scenario], methods: Sequence[str], place: Workplace, within: float = math.inf
 ) -> dict[str, Planned]:
-    """For each subject every method at every spacing that its scenario can have; coarser, where the whole study has
-    only so much time [s]. Raises UserError where that is not enough for any, and for a time on a GPU."""
+    """For each subject every method at the spacings that its scenario can have; coarser, where the whole study has only
+    so much time [s]. Raises UserError for a scenario that cannot be tried at ENOUGH, where the time is not enough for
+    any, and for a time on a GPU."""
+    if within != math.inf:
+        require_number(within, "within", 1.0)
     factors = FACTORS if place.target.device == "cpu" else (*FACTORS, FINEST)
+    for name, scenario in subjects.items():
+        if not spacings(scenario, factors):
+            raise UserError(f"{name}: it cannot have {ENOUGH} spacings near {scenario.spacing:g} m, which are needed")
     wanted = [(scenario, method) for scenario in subjects.values() for method in methods]
     if math.isinf(within):
-        made = [spaced(scenario, factors) for scenario, _ in wanted]
+        made = [spacings(scenario, factors) for scenario, _ in wanted]
     else:
-        require_number(within, "within", 1.0)
         if place.target.device != "cpu":
             raise UserError("within: time is estimated for a CPU alone")
-        made = afford(wanted, factors, within * place.workers)
+        busy = min(place.workers, cores()) if shares_cores(place) else place.target.threads
+        made = afford(wanted, factors, within * busy)
         if not any(made):
             raise UserError(f"within {within:g} s no method can compute {ENOUGH} spacings of {' or '.join(subjects)}")
     found = {name: Planned([], []) for name in subjects}

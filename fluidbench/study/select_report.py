@@ -71,7 +71,7 @@ def _findings(
     else:
         lines.append("Twice as fast: nothing tried.")
     lines.append(
-        f"How sure: {confidence(chosen, tolerance)} (known answers: {', '.join(sorted(physics_of(scenario)))})."
+        f"How sure: {confidence(chosen, tolerance, best)} (known answers: {', '.join(sorted(physics_of(scenario)))})."
     )
     return [*lines, *chosen.remarks]
 

@@ -61,6 +61,7 @@ class Candidate:
     pace: float  # seconds per simulated s
     discretisation: float
     bias: float
+    unbiased: float  # the largest discretisation of any length: the error, if its own limits were right
     run: Run
 
     @property
@@ -70,7 +71,7 @@ class Candidate:
 
 @dataclass
 class Selection:
-    """Everything that the choice rests on."""
+    """Everything that the choice rests on; `scenario` is at any of its spacings."""
 
     candidates: list[Candidate]
     trust: dict[str, Trust]
@@ -78,6 +79,7 @@ class Selection:
     runs: list[Run]
     notes: list[str] = field(default_factory=list)
     untried: list[str] = field(default_factory=list)  # what there was no time for
+    scenario: Scenario | None = None
     erratic: set[str] = field(default_factory=set)  # methods with a length that no line through its spacings explains
 
     @property
@@ -88,6 +90,10 @@ class Selection:
     def missing(self) -> list[str]:
         """Runs that it wanted and has nothing of; that a method refuses is an answer."""
         return lacking(self.runs, refusals=False)
+
+    def witnesses(self) -> list[str]:
+        """Trusted methods whose limits are known here."""
+        return [m for m in self.limits if self.trust[m].trusted and self.limits[m]]
 
     def order(self, method: str) -> float:
         """Least-squares slope of log error over log spacing of a method's candidates; NaN below ENOUGH of them."""
@@ -162,7 +168,7 @@ def assess(
     """Errors of all candidates from finished runs, against what was `measured` where that is known; `untried` is what
     there was no time for."""
     told = averages(measured)
-    result = Selection([], trust_of(scenario, methods), {}, list(runs), untried=list(untried))
+    result = Selection([], trust_of(scenario, methods), {}, list(runs), untried=list(untried), scenario=scenario)
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
         own = [r for r in runs if r.ok and r.method == method]
@@ -191,16 +197,18 @@ def assess(
         spread = f", known to {doubt:.1%}" if doubt else ""
         mean = f" (mean of {len(own)})" if len(own) > 1 else ""
         result.notes.append(f"{own[0].words}: errors are from the measured {told[key]:.4g}{mean}{spread}")
-    consensus, trusted = _consensus(result), [m for m in fits if result.trust[m].trusted]
-    if not trusted:
-        result.notes.append("no method passes most known answers of this physics: the consensus is the mean of all")
-    if len(trusted) == 1:
+    consensus, judged = _consensus(result), result.witnesses()
+    if not judged:
+        result.notes.append(f"{_nobody(result)}: the consensus is the mean of all")
+    if len(judged) == 1:
         result.notes.append(
-            f"the consensus is {trusted[0]}'s own limit: it has no second witness, and its bias is not known"
+            f"the consensus is {judged[0]}'s own limit: it has no second witness, and its bias is not known"
         )
     for run in runs:
         if run.ok and run.method in fits:
-            result.candidates.append(_candidate(run, fits[run.method], consensus, told))
+            made = _candidate(run, fits[run.method], consensus, told)
+            result.candidates += [made] if made else []
+            result.notes += [] if made else [f"{run.name}: has no length to be judged by"]
     result.notes += [_unconverged(result, method) for method in fits if not result.converges(method)]
     return result
 
@@ -259,15 +267,16 @@ def exact_lengths(run: Run) -> dict[str, float]:
 
 def _consensus(result: Selection) -> dict[str, float]:
     """Mean limit of the trusted methods (of all, if none is) for each length."""
-    voters = [m for m in result.limits if result.trust[m].trusted] or list(result.limits)
+    voters = result.witnesses() or list(result.limits)
     keys = {key for m in voters for key in result.limits[m]}
     return {k: float(np.mean([result.limits[m][k] for m in voters if k in result.limits[m]])) for k in keys}
 
 
-def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float], told: dict[str, float]) -> Candidate:
-    """The worst length decides; `told` are those that were measured."""
+def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float], told: dict[str, float]) -> Candidate | None:
+    """The worst length decides; `told` are those that were measured. None where there is no length."""
     record = run.record
-    parts, exact = [(0.0, 0.0)], exact_lengths(run) | told
+    parts: list[tuple[float, float]] = []
+    exact = exact_lengths(run) | told
     for key, value in lengths_of(record).items():
         if key in exact:
             parts.append((abs(value / exact[key] - 1.0), 0.0))
@@ -278,6 +287,8 @@ def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float], told
         scale = abs(consensus.get(key, limit)) or 1.0
         bias = abs(limit - consensus.get(key, limit)) / scale
         parts.append((max(abs(value - limit), scatter) / scale, bias))
+    if not parts:
+        return None
     discretisation, bias = max(parts, key=sum)
     cost = run.cost
     return Candidate(
@@ -288,23 +299,41 @@ def _candidate(run: Run, fits: dict[str, Fit], consensus: dict[str, float], told
         record.seconds / cost.simulated_s,
         discretisation,
         bias,
+        max(own for own, _ in parts),
         run,
     )
 
 
-def confidence(result: Selection, tolerance: float) -> str:
-    """How sure the estimate is: high when two or more trusted methods converge and agree within the tolerance, medium
-    when they converge but do not agree, otherwise low: a limit that is not converged, or that nobody else confirms, may
-    be anything."""
-    trusted = [m for m in result.limits if result.trust[m].trusted]
-    if not trusted:
-        return "low: no method passes most known answers of this physics"
-    if len(trusted) == 1:
-        return f"low: only {trusted[0]} passes most known answers of this physics, and nothing else confirms its limit"
-    keys = set.intersection(*(set(result.limits[m]) for m in trusted))
-    spread = [np.ptp(v) / abs(np.mean(v)) for k in keys if (v := [result.limits[m][k] for m in trusted])]
-    widest = float(max(spread, default=math.inf))
-    words = f"the limits of {' and '.join(trusted)} differ by at most {widest:.1%}"
-    if loose := [m for m in trusted if not result.converges(m)]:
+def confidence(result: Selection, tolerance: float, best: Candidate | None) -> str:
+    """How sure the estimate of the setting chosen is: high when two or more trusted methods converge and agree within
+    the tolerance, medium when they converge but do not agree, or when it is another method's; otherwise low: a limit
+    that is not converged, or that nobody else confirms, may be anything."""
+    judged = result.witnesses()
+    if not judged:
+        return f"low: {_nobody(result)}"
+    if len(judged) == 1:
+        others = [m for m, trust in result.trust.items() if trust.trusted and m not in judged]
+        why = f" ({' and '.join(others)}: not judged here)" if others else ""
+        known = "passes most known answers of this physics"
+        return f"low: only {judged[0]} {known}{why}, and nothing else confirms its limit"
+    keys = set.intersection(*(set(result.limits[m]) for m in judged))
+    if not keys:
+        return f"low: {' and '.join(judged)} have no length in common"
+    widest = max(float(np.ptp(v) / abs(np.mean(v))) for k in keys if (v := [result.limits[m][k] for m in judged]))
+    words = f"the limits of {' and '.join(judged)} differ by at most {widest:.1%}"
+    taken = {best.method} if best is not None else set()
+    if loose := [m for m in dict.fromkeys([*judged, *taken]) if not result.converges(m)]:
         return f"low: {words}, but {' and '.join(loose)} is not converged"
-    return f"{'high' if widest <= tolerance else 'medium'}: {words}"
+    if taken <= set(judged):
+        return f"{'high' if widest <= tolerance else 'medium'}: {words}"
+    (method,) = taken
+    own = result.trust[method]
+    return f"medium: {words}; {method} passes {own.passed} of {own.judged} known answers of this physics"
+
+
+def _nobody(result: Selection) -> str:
+    """Why there is no limit to trust."""
+    trusted = [m for m, trust in result.trust.items() if trust.trusted]
+    if not trusted:
+        return "no method passes most known answers of this physics"
+    return f"{' and '.join(trusted)}, which pass most known answers of this physics, were not judged here"

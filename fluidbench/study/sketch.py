@@ -31,7 +31,7 @@ def sizes(scenario: Scenario) -> list[str]:
         told += [f"bore {1e3 * nozzle.diameter:.4g} mm", f"gap {1e3 * nozzle.standoff:.4g} mm"]
         told.append(f"exit {1e3 * nozzle.speed:.4g} mm/s")
     if path is not None and track is not None:
-        told.append(f"nozzle {1e3 * track.speed_in.max():.4g} mm/s")
+        told.append(f"nozzle {1e3 * track.speed_in[track.flow_in > 0].max():.4g} mm/s")
         told += [f"{path.layers} layers"] if path.layers > 1 else []
     return [*told, f"spacing {1e3 * scenario.spacing:.4g} mm"]
 

@@ -284,7 +284,7 @@ def record(method, spacing, width):
 
 def tried(method, errors):
     """A selection of one method whose errors at these spacings are known."""
-    candidates = [Candidate(method, d, 1e-4, d**-4, d**-4, e, 0.0, finished(method)) for d, e in errors.items()]
+    candidates = [Candidate(method, d, 1e-4, d**-4, d**-4, e, 0.0, e, finished(method)) for d, e in errors.items()]
     return Selection(candidates, {method: Trust(9, 10)}, {method: {"bead_width_m": 0.01}}, [])
 
 
@@ -309,7 +309,7 @@ def test_confidence_needs_a_second_witness_that_converges(monkeypatch):
 
     def sure(*groups, tolerance=0.05):
         methods = [g[0].method for g in groups]
-        return confidence(assess(load("line_bead"), methods, [r for g in groups for r in g]), tolerance)
+        return confidence(assess(load("line_bead"), methods, [r for g in groups for r in g]), tolerance, None)
 
     assert sure(runs("mpm", 0.010), runs("sph", 0.0102)).startswith("high")
     assert sure(runs("mpm", 0.010), runs("sph", 0.0102), tolerance=0.01).startswith("medium")

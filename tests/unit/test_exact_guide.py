@@ -1,22 +1,26 @@
 """What guide says: the choice for each job, machine and tolerance, and what would change it; kept and made again."""
 
+import math
+
 import pytest
 
 from fluidbench.errors import UserError
 from fluidbench.report.figures import figure_of
+from fluidbench.runs.archive import where
+from fluidbench.scenario.measured import Measured
 from fluidbench.study.choice import choices
-from fluidbench.study.guide import JOBS, NAME, guide, published, subjects_of
+from fluidbench.study.guide import JOBS, NAME, guide, published, subjects_of, tolerances_of
 from fluidbench.study.guide_chart import _time, chart
 from fluidbench.study.guide_report import report, sentence
 from fluidbench.study.selection import Candidate, Selection, Trust
 from fluidbench.study.workplace import cores
 
-from .made import BEAD, finished, working
+from .made import BEAD, change, finished, working
 
 
 def selection(*rows, trusted=("mpm", "sph")):
     """Candidates (method, spacing [mm], seconds, discretisation, bias)."""
-    found = [Candidate(m, 1e-3 * d, 1e-4, t, t, e, b, finished(m)) for m, d, t, e, b in rows]
+    found = [Candidate(m, 1e-3 * d, 1e-4, t, t, e, b, e, finished(m)) for m, d, t, e, b in rows]
     methods = dict.fromkeys(m for m, *_ in rows)
     limits = {m: {"height_m": 1.0} for m in methods}
     return Selection(found, {m: Trust(m in trusted, 1) for m in methods}, limits, [])
@@ -32,7 +36,11 @@ def chosen(found, *tolerances):
 def test_the_cheapest_within_a_tolerance_is_chosen_and_its_rival_named():
     tight, middle, wide = chosen(TWO, 0.01, 0.03, 0.1)
     assert not tight.met and tight.best.error == pytest.approx(0.02)
-    assert tight.change == "a finer spacing than was tried, or a tolerance of 2%"
+    assert tight.change == "a tolerance of 2 %"
+    falls = [("mpm", d, 1.0, 0.02 * d, 0.0) for d in (1, 2, 4)]
+    assert chosen(selection(*falls), 0.01)[0].change == "a finer spacing than was tried, or a tolerance of 2 %"
+    biased = [("mpm", d, 1.0, 0.001 * d, 0.1234) for d in (1, 2, 4)]
+    assert chosen(selection(*biased), 0.01)[0].change == "a tolerance of 12.5 %"
     assert middle.met and (middle.best.method, middle.best.spacing) == ("mpm", 1e-3)
     assert middle.change == "as good: SPH at 1 mm takes 1.2 times as long"
     assert (wide.best.method, wide.best.spacing) == ("mpm", 2e-3)
@@ -95,6 +103,11 @@ def test_jobs_are_named_by_their_scenarios():
         subjects_of([BEAD, "line_bead"], False)
 
 
+def test_the_chosen_machine_is_named_where_nothing_was_run():
+    assert where([finished(device="cuda:0", verdict="refused"), finished(machine={"device": "H200"})]) == "H200"
+    assert where([finished(device="cuda:0", verdict="refused")]) == "cuda:0" and where([]) == "CPU"
+
+
 def answer(job):
     d, m = job.scenario["spacing"], job.method
     more = {"input": job.scenario, "cpu_s": d**-4}
@@ -123,3 +136,54 @@ def test_a_guide_is_made_again_from_what_it_keeps(tmp_path, monkeypatch):
         published(tmp_path / "c")
     with pytest.raises(UserError, match=r"no selections\.json"):
         published(tmp_path / "b")
+
+
+def keep_as(machine, made, folder):
+    """Keep a study as one that was made on a machine, in a folder."""
+    for i, run in enumerate(made.runs):
+        change(run, machine={"device": machine})
+        object.__setattr__(run, "folder", folder / "runs" / str(i))
+    made.keep(folder)
+
+
+def test_runs_that_ended_badly_are_kept_too_and_said(tmp_path, monkeypatch):
+    """The first of all refused, the finest too slow: neither has a scenario of its own."""
+
+    def broken(job):
+        verdict = {3e-3: "refused", 1.125e-3: "timeout"}.get(round(job.scenario["spacing"], 9))
+        return finished(job.method, verdict, spacing=job.scenario["spacing"]) if verdict else answer(job)
+
+    working(monkeypatch, broken)
+    made = guide([BEAD], ["mpm"], tolerances=[0.1], out=tmp_path / "a", progress=False)
+    assert not made.ok and len(made.missing) == 1 and made.report.failures == made.missing
+    keep_as("GPU", made, tmp_path / "a")
+    again = published(tmp_path, [0.1])
+    assert not again.ok and again.missing == made.missing and made.missing[0] in again.report.files["guide.md"]
+    assert again.report.details[0].lines == [line.replace("CPU", "GPU") for line in made.report.details[0].lines]
+
+
+def test_studies_of_other_scenarios_are_not_put_side_by_side(tmp_path, monkeypatch):
+    working(monkeypatch, answer)
+    keep_as("CPU", guide([BEAD], ["mpm"], out=tmp_path / "a", progress=False), tmp_path / "a")
+    other = BEAD.model_copy(update={"duration": 9.0})
+    keep_as("GPU", guide([other], ["mpm"], out=tmp_path / "b", progress=False), tmp_path / "b")
+    with pytest.raises(UserError, match="paste bead is another scenario than elsewhere"):
+        published(tmp_path)
+
+
+def test_what_was_measured_counts(tmp_path, monkeypatch):
+    working(monkeypatch, answer)
+    wide = BEAD.model_copy(update={"measured": (Measured(quantity="width", value=0.02),)})
+    made = guide([wide], ["mpm"], tolerances=[0.1], out=tmp_path, progress=False)
+    assert not made.table.met.any() and made.table.error.iloc[0] == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("given", [[], [math.nan], [0.0], ["5%"], [0.05, -1.0]])
+def test_tolerances_are_numbers_above_nothing(given, tmp_path):
+    for call in (lambda: guide([BEAD], tolerances=given, out=tmp_path), lambda: published(tmp_path, given)):
+        with pytest.raises(UserError, match="tolerance"):
+            call()
+
+
+def test_a_tolerance_named_twice_is_one():
+    assert tolerances_of([0.05, 0.02, 0.05]) == [0.02, 0.05] and tolerances_of(0.1) == [0.1]

@@ -10,6 +10,7 @@ import pytest
 from fluidbench.errors import UserError
 from fluidbench.measure.reference import Answer
 from fluidbench.method.target import Target
+from fluidbench.scenario.library import load
 from fluidbench.study import selection as module
 from fluidbench.study.select import candidates, select
 from fluidbench.study.selection import (
@@ -102,7 +103,7 @@ def test_a_line_explains_what_rises_twice_its_scatter_or_scatters_by_a_percent(l
 
 
 def trusting(monkeypatch, *trusted):
-    monkeypatch.setattr(module, "trust_of", lambda _, ms: {m: Trust(m in trusted, 1) for m in ms})
+    monkeypatch.setattr(module, "trust_of", lambda _, ms: {m: Trust(int(m in trusted), 1) for m in ms})
 
 
 def line(method, limit, slope, spacings=(1.0, 2.0, 4.0), key="height_m"):
@@ -184,7 +185,7 @@ def test_what_no_line_explains_is_erratic(monkeypatch):
 
 def made(*rows, method="mpm", bias=0.0):
     """A selection of candidates (spacing, wall, discretisation)."""
-    found = [Candidate(method, d, 1e-4, w, 10 * w, e, bias, finished(method)) for d, w, e in rows]
+    found = [Candidate(method, d, 1e-4, w, 10 * w, e, bias, e, finished(method)) for d, w, e in rows]
     return Selection(found, {method: Trust(1, 1)}, {method: {"height_m": 1.0}}, [])
 
 
@@ -253,14 +254,49 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
             r.record.measures["slump"] = 0.1 * r.record.spacing_m  # a length that the others do not have
         r.record.measures["front_x_m"] = 1.0  # and one in which all agree
     found = assess(BEAD, ["mpm", "sph", "pbd"], rows)
-    assert confidence(found, tolerance) == sure
+    assert confidence(found, tolerance, None) == sure
     found.erratic.add("sph")
-    assert confidence(found, tolerance) == f"low: {sure.partition(': ')[2]}, but sph is not converged"
+    assert confidence(found, tolerance, None) == f"low: {sure.partition(': ')[2]}, but sph is not converged"
     trusting(monkeypatch)
-    assert confidence(assess(BEAD, ["mpm"], line("mpm", 10.0, 0.2)), 1.0).startswith("low: no method passes")
+    assert confidence(assess(BEAD, ["mpm"], line("mpm", 10.0, 0.2)), 1.0, None).startswith("low: no method passes")
     trusting(monkeypatch, "mpm", "sph")
     parted = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + line("sph", 10.0, 0.2, key="slump"))
-    assert confidence(parted, 1e9) == "medium: the limits of mpm and sph differ by at most inf%"
+    assert confidence(parted, 1e9, None) == "low: mpm and sph have no length in common"
+
+
+def test_confidence_is_that_of_the_setting_chosen(monkeypatch):
+    """Two trusted methods agree; a third, not trusted, is sure only if it converges, and never highly."""
+    trusting(monkeypatch, "mpm", "sph")
+    rows = line("mpm", 10.0, 0.2) + line("sph", 10.0, 0.2)
+    words = "the limits of mpm and sph differ by at most 0.0%"
+
+    def sure(third):
+        found = assess(BEAD, ["mpm", "sph", "pbd"], rows + third)
+        return [confidence(found, 0.1, next(c for c in found.candidates if c.method == m)) for m in ("mpm", "pbd")]
+
+    known = "pbd passes 0 of 1 known answers of this physics"
+    assert sure(line("pbd", 10.0, 0.2)) == [f"high: {words}", f"medium: {words}; {known}"]
+    scattered = [run("pbd", d, height_m=h) for d, h in ((1.0, 10.0), (2.0, 12.0), (4.0, 9.0))]
+    assert sure(scattered) == [f"high: {words}", f"low: {words}, but pbd is not converged"]
+
+
+def test_a_method_that_was_not_judged_is_not_said_to_fail(monkeypatch):
+    trusting(monkeypatch, "mpm", "sph")
+    alone = assess(BEAD, ["mpm", "sph"], line("sph", 10.0, 0.2))
+    assert confidence(alone, 0.1, None) == (
+        "low: only sph passes most known answers of this physics (mpm: not judged here), and nothing else confirms "
+        "its limit"
+    )
+    nobody = assess(BEAD, ["mpm", "sph", "pbd"], line("pbd", 10.0, 0.2))
+    why = "mpm and sph, which pass most known answers of this physics, were not judged here"
+    assert confidence(nobody, 0.1, None) == f"low: {why}" and f"{why}: the consensus is the mean of all" in nobody.notes
+
+
+def test_what_has_no_length_is_no_candidate(monkeypatch):
+    trusting(monkeypatch, "mpm")
+    found = assess(BEAD, ["mpm"], line("mpm", 1.0, 0.1, key="mass_kg"))
+    assert found.candidates == [] and any("has no length to be judged by" in note for note in found.notes)
+    assert found.recommend(0.1, *ALWAYS)[0] is None and confidence(found, 0.1, None).startswith("low")
 
 
 def test_four_spacings_are_run_of_every_method_where_the_nozzle_allows(tmp_path):
@@ -343,8 +379,28 @@ def test_spacings_lie_nearer_where_none_can_be_wide(tmp_path, monkeypatch):
 
     full = sum(100.0 * (f * 4 / 1.5) ** -4 for f in (1.5, 1.0, 0.75))
     assert tried(1.001 * full) == pytest.approx([6e-3, 4e-3, 3e-3])
-    near = sum(100.0 * (f * 4 / 1.5) ** -4 for f in afford.NEAR)
-    assert near < 0.5 * full and tried(1.001 * near) == pytest.approx([4e-3 * f for f in afford.NEAR])
+    near = sum(100.0 * (f * 4 / 1.5) ** -4 for f in afford.NARROW[0])
+    assert near < 0.5 * full and tried(1.001 * near) == pytest.approx([4e-3 * f for f in afford.NARROW[0]])
+
+
+def test_a_scenario_that_can_only_be_finer_is_tried_there_or_refused(tmp_path, monkeypatch):
+    tower = load("foam_tower")
+    jobs = candidates({"tower": tower}, ["mpm"], workplace_in(tmp_path))["tower"].jobs
+    assert [j.scenario["spacing"] / tower.spacing for j in jobs] == pytest.approx([1.0, 0.85, 0.7])
+    monkeypatch.setattr(afford, "NARROW", ())
+    for within in (math.inf, 1e9):
+        with pytest.raises(UserError, match="tower: it cannot have 3 spacings near"):
+            candidates({"tower": tower}, ["mpm"], workplace_in(tmp_path), within)
+
+
+def test_time_is_of_the_cores_that_there_are(tmp_path, monkeypatch):
+    """Runs of several threads go one by one, and no more than the cores' work side by side."""
+    spent = costing(monkeypatch, sph=500.0)
+    for workers, threads, share in ((2, 1, 2), (16, 1, cores()), (8, 2, 2)):
+        place = workplace_in(tmp_path, workers=workers)
+        place.target = Target("cpu", threads=threads)
+        used = spent(candidates({"bead": BEAD}, ["sph"], place, 100.0)["bead"].jobs)
+        assert 100.0 * min(share, cores()) / 1.05**4 < used <= 100.0 * min(share, cores())
 
 
 def test_what_is_refused_takes_no_time():

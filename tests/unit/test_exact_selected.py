@@ -14,7 +14,7 @@ ALWAYS = (math.inf, math.inf)
 
 def made(*rows, method="mpm", bias=0.0):
     """A selection of candidates (spacing, wall, discretisation)."""
-    found = [Candidate(method, d, 1e-4, w, 10 * w, e, bias, finished(method)) for d, w, e in rows]
+    found = [Candidate(method, d, 1e-4, w, 10 * w, e, bias, e, finished(method)) for d, w, e in rows]
     return Selection(found, {method: Trust(1, 1)}, {method: {"height_m": 1.0}}, [])
 
 

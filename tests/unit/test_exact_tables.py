@@ -220,19 +220,21 @@ def test_the_page_of_the_tower_has_a_row_a_variant(tmp_path):
         finished(verdict="timeout", key="k", folder=tmp_path / "r"),
     ]
     rows = [
-        Row("plain", None, "mpm", runs([90.0, 110.0], machine={"cores": "2"}), runs([40.0, 40.0])),
-        Row("expansion + curing + drone", 5000, "mpm", broken, []),
+        Row("plain", None, "mpm", runs([90.0, 110.0], machine={"cores": "2"}), runs([40.0, 40.0]), "CPU"),
+        Row("expansion + curing + drone", 5000, "mpm", broken, [], "CPU"),
+        Row("curing", 5000, "mpm", [*runs([90.0]), broken[0]], [], "CPU"),
     ]
     made = table2_page.report(rows, tmp_path)
     assert made.tables[0].rows == [
         ["plain", "mpm", "as needed", "1234", "0.2", "100 ± 14", "2 ± 0.28", "11.7 ± 0.2", "0.8 ± 0", "15.7 ± 0.1"],
         ["expansion + curing + drone", "mpm", "5000", "-", "-", "error, timeout", "-", "16.7 ± 0.1", "-", "59.3 ± 0.2"],
+        ["curing", "mpm", "5000", "1234", "0.2", "error", "-", "12.6 ± 0.2", "-", "34.2 ± 0.3"],
     ]
-    first, second = made.data.to_dict("records")
+    first, second, _ = made.data.to_dict("records")
     paces = [f"{whose}wall_per_simulated_s{kind}" for whose in ("", "paper_") for kind in ("", "_pictures")]
     assert [first[key] for key in ("steps_per_s", *paces)] == [100.0, 2.0, 0.8, 11.7, 15.7]
     assert (first["repeats"], first["bytes"], first["launches_per_substep"], second["repeats"]) == (2, 42, 4, 0)
-    assert made.machine == "CPU: cores 2" and [len(v) for v in made.runs.values()] == [4, 2]
+    assert made.machine == "CPU: cores 2" and [len(v) for v in made.runs.values()] == [4, 2, 2]
     assert [row[:2] for row in made.tables[1].rows] == [["mpm", "cost insensitive to the pool's size"]]
     assert made.findings[0].startswith("mpm: 'cost insensitive to the pool's size': not decidable")
 

@@ -10,7 +10,7 @@ from fluidbench.paper.table2 import NAME, keep, published, table2
 from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
 from fluidbench.scenario.library import load
 
-from .made import finished, working
+from .made import change, finished, working
 
 TAICHI = Target(backend="taichi")
 
@@ -22,6 +22,7 @@ def row(variant, bare, filmed=(), pool=None):
         "mpm",
         [finished(steps_per_s=s, wall_per_simulated_s=s / 100) for s in bare],
         [finished(steps_per_s=s, wall_per_simulated_s=s / 100) for s in filmed],
+        "CPU",
     )
 
 
@@ -184,6 +185,18 @@ def test_a_timing_is_told_again_from_what_it_keeps(tmp_path):
     again = published(tmp_path, tmp_path / "out")
     assert again.report.files["table2.md"] == page.report(made, tmp_path).files["table2.md"]
     assert again.ok and [r.speed() for r in again.rows] == [r.speed() for r in made] and again.save().exists()
+    keep(made, tmp_path / "other")
+    with pytest.raises(UserError, match="a second study of CPU"):
+        published(tmp_path)
+    for run in made[0].bare:
+        change(run, machine={"device": "GPU"}, input={"duration": 9.0})
+    keep(made[:1], tmp_path / "other")
+    with pytest.raises(UserError, match="its towers are not those of the other studies"):
+        published(tmp_path)
+    made[1].variant = "of another edition"
+    keep(made, tmp_path / "other")
+    with pytest.raises(UserError, match="of another edition"):
+        published(tmp_path)
     (tmp_path / "cpu" / f"{NAME}.json").write_text("{}")
     with pytest.raises(UserError, match="is not as it was written"):
         published(tmp_path)

@@ -91,7 +91,7 @@ def test_selection_extrapolates_and_knows_the_bias():
     assert best is not None and (best.method, best.spacing, why) == ("mpm", 1.5, "")
     _, why = chosen.recommend(0.001, math.inf, math.inf)
     assert "nothing tried meets the tolerance" in why
-    assert "only mpm" in confidence(chosen, 0.05)
+    assert "only mpm" in confidence(chosen, 0.05, None)
 
 
 def test_known_answers_cover_every_method_and_class():
