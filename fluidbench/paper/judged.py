@@ -139,7 +139,8 @@ def stability(e: Evidence) -> list[Cell]:
         verdict = placed(places[m], place) if known else OPEN
         brief = f"stable to {beyond}{', '.join(steps) or '?'} d/c"
         runs = e.repeats.get(m, [])
-        found.append(Cell("stability and dt", "", m, word, brief, text, "stability, compare", "step", verdict, runs))
+        by = f"fluidbench stability {e.scenario.name} --axis spacing --solvers {m}, and compare"
+        found.append(Cell("stability and dt", "", m, word, brief, text, by, "step", verdict, runs))
     return found
 
 
