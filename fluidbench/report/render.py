@@ -16,10 +16,28 @@ from ..runs.record import FINAL_FRAME, Run, recall
 from ..runs.store import RECORD
 from ..scenario import Scenario
 
-COLOURS = ("layer", "phase", "speed", "stress", "density", "height")
+COLOURS = {
+    "layer": "",
+    "phase": "level of cure",
+    "speed": "speed [m/s]",
+    "stress": "elastic shear stress [Pa]",
+    "density": "density [kg/m^3]",
+    "height": "height [mm]",
+}
+"""What particles may be coloured by, and what their scale is called."""
 WINDOW, TURNS, FPS = (1280, 960), 90, 20
 PICTURES = 20_000  # of a film: a quarter of an hour
 RULERS = (1.0, 2.0, 5.0)  # times a power of ten: lengths that a scale bar may have
+BAR = {
+    "color": "black",
+    "n_labels": 3,
+    "fmt": "%.3g",
+    "title_font_size": 22,
+    "label_font_size": 18,
+    "position_x": 0.3,
+    "width": 0.4,
+    "height": 0.09,
+}
 LAYERS = ("#3473b7", "#f29e40")  # alternating, as in the paper's pictures
 
 
@@ -49,13 +67,15 @@ def load(folder: Path) -> tuple[Scenario, list[dict[str, np.ndarray]]]:
 
 
 def values_of(frame: dict[str, np.ndarray], scenario: Scenario, colour: str) -> np.ndarray:
-    """What a particle is coloured by, shape (n,)."""
+    """What a particle is coloured by, shape (n,), in the unit that COLOURS names."""
     if colour not in COLOURS:
-        raise UserError(f"no colour {quoted(colour)}{suggestion(colour, COLOURS)}; there are {', '.join(COLOURS)}")
+        raise UserError(
+            f"no colour {quoted(colour)}{suggestion(colour, list(COLOURS))}; there are {', '.join(COLOURS)}"
+        )
     if colour == "speed":
         return np.linalg.norm(frame["velocity"], axis=1)
     if colour == "height":
-        return frame["position"][:, 2]
+        return 1e3 * frame["position"][:, 2]
     if colour == "layer":
         track = scenario.track
         births = frame["birth_time"].astype(float)
@@ -127,7 +147,7 @@ class Stage:
         style: dict[str, Any] = (
             {"cmap": list(LAYERS), "show_scalar_bar": False}
             if self.colour == "layer"
-            else {"cmap": "viridis", "scalar_bar_args": {"title": self.colour, "color": "black"}}
+            else {"cmap": "viridis", "scalar_bar_args": {"title": f"{COLOURS[self.colour]}\n", **BAR}}
         )
         cloud = _cloud(self.pv, frame, self.scenario, self.colour)
         self.plotter.add_mesh(cloud, scalars="value", clim=self.limits, name="matter", smooth_shading=True, **style)
