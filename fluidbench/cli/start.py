@@ -45,4 +45,4 @@ def init(
     typer.echo(f"written: {file}")
     for line in outlook(load(file)):
         typer.echo(line)
-    typer.echo(f"next: fluidbench show {file} --path; fluidbench compare {file}")
+    typer.echo(f"next: fluidbench show {file} --path; fluidbench compare {file}; fluidbench select {file} --within 8m")
