@@ -29,7 +29,7 @@ class Backend(Protocol):
         ...
 
     def prepare(self, solver: Any) -> None:
-        """Compile all kernels of a solver (`solver.kernels`)."""
+        """Compile all kernels of a solver (`solver.kernels`), and those of its viscous solve where it has one."""
         ...
 
     def wait(self) -> None:
@@ -49,7 +49,8 @@ class Warp:
         wp.capture_while(going, body)  # inside a graph, too
 
     def prepare(self, solver: Any) -> None:
-        for name in {kernel.module.name for kernel in vars(solver.kernels).values()}:
+        parts = [part for part in (solver, solver.viscosity) if part is not None]
+        for name in {kernel.module.name for part in parts for kernel in vars(part.kernels).values()}:
             self.load(name)
 
     def wait(self) -> None:

@@ -360,9 +360,6 @@ class SolverMPM(Solver):
             self.scene.crew.load(aging)
         self.order.prepare()
         self.backend.prepare(self)
-        if self.viscosity is not None and self.backend.name == "warp":
-            for name in {kernel.module.name for kernel in vars(self.viscosity.kernels).values()}:
-                self.scene.crew.load(name)
         if self.by_block is not None:
             self.by_block.prepare()
         self.started = False

@@ -11,6 +11,7 @@ from fluidbench.method.suitability import check_backend
 from fluidbench.method.target import Target
 from fluidbench.native.crew import Crew, index_of, put, raise_fault
 from fluidbench.native.simulation import Simulation
+from fluidbench.scenario.domain import Walls
 from fluidbench.study.speed import block
 
 from ..conftest import bead, scenario
@@ -77,10 +78,11 @@ def world(material=PASTE, **more):
     return scenario(domain=domain, bodies=[BLOCK], material=material, duration=0.05, spacing=0.01, **more)
 
 
+SYRUP = {"density": 1000.0, "viscosity": 5.0, "sound_speed": 10.0}
 CASES = {
     "liquid": lambda: world(material={"density": 1000.0, "sound_speed": 10.0}),
     "paste": world,
-    "syrup": lambda: world(material={"density": 1000.0, "viscosity": 5.0, "sound_speed": 10.0}),
+    "syrup": lambda: world(material=SYRUP),
     "solid": lambda: world(material={"density": 1000.0, "youngs_modulus": 1e4}),
     "curing": lambda: world(material=PASTE | {"cure": {"delay": 0.01, "youngs_modulus": 1e5}}),
     "growing": lambda: world(material=PASTE | {"expansion": {"ratio": 1.5, "time": 0.05}}),
@@ -107,6 +109,32 @@ def test_the_bits_are_the_same_for_any_number_of_threads(case, method):
     given = CASES[case]()
     one = bits(given, method, 1)
     assert bits(given, method, 2) == one == bits(given, method, 3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("case", [*CASES, "implicit"])
+def test_nothing_is_left_to_compile_once_a_run_is_prepared(case, method, monkeypatch):
+    """What a run costs is told without compilation, on a machine that has compiled nothing, too."""
+    given = CASES["syrup" if case == "implicit" else case]()
+    if case == "implicit" and method != "pbd":
+        own = {"numerics": {method: {"viscosity": "implicit"}}}
+        given = given.model_copy(update={"domain": given.domain.model_copy(update={"walls": Walls()}), **own})
+    sim = Simulation(given, method)
+    module = type(wp.get_module("solvers.search"))
+    loaded, load = set(), module.load
+
+    def noted(self, *args, **more):
+        loaded.add(self.name)
+        return load(self, *args, **more)
+
+    monkeypatch.setattr(module, "load", noted)
+    sim.prepare()
+    prepared = set(loaded)
+    sim.begin()
+    for _ in range(sim.ticks):
+        sim.advance_tick()
+        sim.look()
+    assert loaded <= prepared, loaded - prepared
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.5, 2.0])
