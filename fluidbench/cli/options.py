@@ -105,7 +105,7 @@ From = Annotated[
 Within = Annotated[
     str | None,
     typer.Option(
-        help="time that the whole study may take on a CPU, e.g. 5m: spacings are coarser, method by method",
+        help="time that the whole study may take on a CPU, e.g. 5m: spacings are finer or coarser, method by method",
         show_default=False,
     ),
 ]

@@ -11,7 +11,8 @@ from .estimate import estimate
 from .selection import ENOUGH
 
 STARTING = 4.0  # seconds before a run begins
-WIDER, MOST_WIDER = 1.05, 60  # spacings are widened by this factor at a time, to 18 times at most
+STEP = 1.05  # spacings are widened by this factor at a time
+FINEST, WIDEST = -14, 60  # times: from half of what they were, where there is time, to 18 times
 NARROW = ((1.5, 1.25, 1.0), (1.0, 0.85, 0.7))  # over the scenario's spacing, where it cannot be as wide as is wanted
 
 
@@ -22,8 +23,8 @@ def spacings(scenario: Scenario, factors: Sequence[float]) -> list[Scenario]:
 
 
 def afford(wanted: Sequence[tuple[Scenario, str]], factors: Sequence[float], seconds: float) -> list[list[Scenario]]:
-    """For each scenario and method its `spacings`, all so much wider that everything together takes so long on one core
-    [s], as estimated; none where ENOUGH of them would take longer than their share.
+    """For each scenario and method its `spacings`, all so much finer or wider that everything together takes so long on
+    one core [s], as estimated; none where ENOUGH of them would take longer than their share.
 
     Everything gets an equal share, and what one leaves of its own goes to those that take longer.
     """
@@ -52,16 +53,16 @@ def _finest(scenario: Scenario, method: str, factors: Sequence[float], share: fl
 
 def _widened(scenario: Scenario, method: str, factors: Sequence[float], share: float) -> list[Scenario]:
     def wider(i: int) -> list[Scenario]:
-        return _spaced(scenario, [WIDER**i * factor for factor in factors])
+        return _spaced(scenario, [STEP**i * factor for factor in factors])
 
-    most = _first(MOST_WIDER, lambda i: len(wider(i)) < ENOUGH)
-    i = _first(most, lambda i: _cost(wider(i), method) <= share)
+    most = _first(range(FINEST, WIDEST), lambda i: len(wider(i)) < ENOUGH)
+    i = _first(range(FINEST, most), lambda i: _cost(wider(i), method) <= share)
     return wider(i) if i < most else []
 
 
-def _first(count: int, holds: Callable[[int], bool]) -> int:
-    """The first of so many from which on something holds; `count` where it never does."""
-    return bisect_left(range(count), True, key=holds)
+def _first(numbers: range, holds: Callable[[int], bool]) -> int:
+    """The first number from which on something holds; one after the last where it never does."""
+    return numbers.start + bisect_left(numbers, True, key=holds)
 
 
 def _cost(scenarios: Sequence[Scenario], method: str) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Unpack
 
@@ -54,8 +54,8 @@ def select(
     Runs every method at four spacings, on a GPU at five. `scenario` is one, a shipped name or a TOML file; `methods`
     are names, default all. `called` is the scenario's name in the command that it recommends. `measured`: a table of
     what was measured on a real print (CSV), which errors are then counted from, beside what the scenario has of it.
-    `within`: time [s] that the study may take on a CPU, as estimated: spacings are coarser, for each method as much as
-    it needs. `options` are those of every verb, see Options.
+    `within`: time [s] that the study may take on a CPU, as estimated: spacings are so much finer or coarser, method by
+    method. `options` are those of every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is.
     """
@@ -97,6 +97,7 @@ def candidates(
             raise UserError("within: time is estimated for a CPU alone")
         busy = min(place.workers, cores()) if shares_cores(place) else place.target.threads
         made = afford(wanted, factors, within * busy)
+        place = replace(place, wall_limit=max(place.wall_limit, within))
         if not any(made):
             raise UserError(f"within {within:g} s no method can compute {ENOUGH} spacings of {' or '.join(subjects)}")
     found = {name: Planned([], []) for name in subjects}

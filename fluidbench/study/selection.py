@@ -3,8 +3,9 @@
 A scenario without an exact answer gets its error estimated in three parts, all relative to a length:
 
 - discretisation: each length is extrapolated within a method to zero spacing at first order (what these methods show on
-  extrusion), by least squares over all spacings run, the finer ones counting more; the error at a spacing is the
-  distance to that limit, or the scatter about the fit from there down if that is larger;
+  extrusion), by least squares over all spacings run, the finer ones counting more; where a line foretells a spacing
+  that is left out no better than the mean does, its slope is noise, and the mean is the limit; the error at a spacing
+  is the distance to that limit, or the scatter about the fit from there down if that is larger;
 - bias: the distance of a method's limit from the consensus, the mean limit of the trusted methods;
 - trust: a method is trusted when it passes most known answers of the scenario's own physics
   (scenarios/reference/known_answers.csv, made by `fluidbench validate`).
@@ -232,7 +233,8 @@ def _unconverged(result: Selection, method: str) -> str:
 
 @dataclass(frozen=True)
 class Fit:
-    """A length as limit + slope d: its limit at zero spacing, and its distance from the fit at each spacing."""
+    """A length as limit + slope d: its limit at zero spacing, and its distance from the fit at each spacing; no slope
+    where it is not known."""
 
     limit: float
     slope: float
@@ -251,12 +253,28 @@ class Fit:
 
 
 def extrapolate(runs: Sequence[Run], key: str) -> Fit:
-    """First order in the spacing, weighted by its inverse."""
+    """First order in the spacing, or none: whichever foretells each spacing better from the others. Weighted by the
+    inverse spacing, since what a length scatters by falls with it."""
     d = np.array([r.record.spacing_m for r in runs])
     q = np.array([lengths_of(r.record)[key] for r in runs])
-    slope, limit = np.polyfit(d, q, 1, w=1.0 / d)
+    slope, limit = _line(d, q, min((0, 1), key=lambda order: _missed(d, q, order)))
     residual = np.abs(q - (slope * d + limit))
     return Fit(float(limit), float(slope), dict(zip(d.tolist(), residual.tolist(), strict=True)))
+
+
+def _line(d: np.ndarray, q: np.ndarray, order: int) -> tuple[float, float]:
+    """(slope, value at d = 0) of a line through q, or of the level where `order` is 0."""
+    found = np.polyfit(d, q, order, w=1.0 / d)
+    return (0.0, float(found[0])) if order == 0 else (float(found[0]), float(found[1]))
+
+
+def _missed(d: np.ndarray, q: np.ndarray, order: int) -> float:
+    """By how much a line through the others misses each point, over its spacing: the sum of squares."""
+    total = 0.0
+    for i in range(len(d)):
+        slope, limit = _line(np.delete(d, i), np.delete(q, i), order)
+        total += float((q[i] - (slope * d[i] + limit)) / d[i]) ** 2
+    return total
 
 
 def exact_lengths(run: Run) -> dict[str, float]:

@@ -81,6 +81,24 @@ def test_extrapolation_weighs_by_the_inverse_spacing():
     assert fit.residual == pytest.approx({a: abs(b - limit - slope * a) for a, b in zip(d, q, strict=True)})
 
 
+def test_a_slope_that_foretells_nothing_is_noise():
+    """About a level the limit is the level, about a line it is the line's."""
+    d = (1.0, 1.5, 2.0, 3.0)
+    level = extrapolate([run("mpm", a, height_m=b) for a, b in zip(d, (1.0, 1.1, 0.9, 1.0), strict=True)], "height_m")
+    w = np.array(d) ** -2.0
+    assert level.slope == 0.0 and level.limit == pytest.approx(w @ [1.0, 1.1, 0.9, 1.0] / w.sum())
+    noisy = [1.0 + 0.2 * a + e for a, e in zip(d, (0.01, -0.01, 0.01, -0.01), strict=True)]
+    rising = extrapolate([run("mpm", a, height_m=b) for a, b in zip(d, noisy, strict=True)], "height_m")
+    assert rising.slope == pytest.approx(0.2, abs=0.02) and rising.limit == pytest.approx(1.0, abs=0.03)
+
+
+def test_one_spacing_that_is_far_too_wide_does_not_turn_the_limit_over():
+    """Widths of a foam 2 to 3 particles across: a line through them ends below nothing."""
+    widths = {16.5: 0.299, 13.8: 0.136, 11.0: 0.123}
+    found = extrapolate([run("sph", a, height_m=b) for a, b in widths.items()], "height_m")
+    assert found.slope == 0.0 and 0.123 < found.limit < 0.2 and not found.explains
+
+
 def test_scatter_is_the_largest_from_a_spacing_down():
     fit = Fit(1.0, 0.0, {1.0: 0.3, 2.0: 0.1, 4.0: 0.5})
     assert [fit.scatter(d) for d in (1.0, 2.0, 4.0)] == [0.3, 0.3, 0.5]
@@ -342,14 +360,17 @@ def costing(monkeypatch, **cost):
     return lambda jobs: sum(cost[j.method] * (j.scenario["spacing"] / BEAD.spacing) ** -4 for j in jobs)
 
 
-def test_spacings_are_coarser_where_time_is_short(tmp_path, monkeypatch):
-    """What MPM leaves of its 60 s goes to the others."""
+def test_spacings_are_as_fine_as_there_is_time(tmp_path, monkeypatch):
+    """Finer than without a limit where a method is cheap, down to half; what MPM leaves of its 60 s goes to others."""
     spent = costing(monkeypatch, mpm=1.0, sph=100.0, pbd=1e9)
     place = workplace_in(tmp_path, workers=2)
     found = candidates({"bead": BEAD}, ["mpm", "sph", "pbd"], place, within=90.0)["bead"]
     own = {m: [j for j in found.jobs if j.method == m] for m in ("mpm", "sph")}
     finest = {m: min(j.scenario["spacing"] for j in jobs) for m, jobs in own.items()}
-    assert finest["mpm"] == pytest.approx(0.75 * BEAD.spacing) and len(found.jobs) == 8
+    assert finest["mpm"] == pytest.approx(0.75 * 1.05**-13 * BEAD.spacing) and len(found.jobs) == 8
+    assert spent(own["mpm"]) <= 60.0 < 1.05**4 * spent(own["mpm"])
+    half = candidates({"bead": BEAD}, ["mpm"], place, within=1e6)["bead"].jobs[-1].scenario["spacing"]
+    assert half == pytest.approx(0.75 * 1.05**-14 * BEAD.spacing)
     share = (180.0 - spent(own["mpm"])) / 2
     assert share / 1.05**4 < spent(own["sph"]) <= share
     assert found.untried == [
