@@ -63,7 +63,7 @@ def _change(found: Selection, tolerance: float, best: Candidate) -> str:
         rival = min(rivals, key=lambda c: c.seconds)
         factor = rival.seconds / best.seconds
         close = "as good: " if factor < CLOSE else ""
-        parts.append(f"{close}{setting(rival)} takes {factor:.2g} times as long")
+        parts.append(f"{close}{setting(rival)} takes {_times(factor)} as long")
     else:
         others = [c for c in found.candidates if c.method != best.method]
         near = min(others, key=lambda c: c.error, default=None)
@@ -71,7 +71,7 @@ def _change(found: Selection, tolerance: float, best: Candidate) -> str:
     unbiased = [c for c in found.candidates if c.unbiased <= tolerance]
     other = min(unbiased, key=lambda c: c.seconds)
     if other.method != best.method:
-        saved = f"{setting(other)} at {other.seconds / best.seconds:.2g} of the time"
+        saved = f"{setting(other)} in {time_of(other.seconds)}"
         parts.append(f"{saved}, if its own limit is the right one ({other.bias:.0%} from the consensus)")
     return "; ".join(parts)
 
@@ -79,6 +79,17 @@ def _change(found: Selection, tolerance: float, best: Candidate) -> str:
 def _finer(found: Selection, tolerance: float, best: Candidate) -> str:
     """Whether a finer spacing would be within the tolerance."""
     return "a finer spacing than was tried, or " if best.bias < tolerance and found.converges(best.method) else ""
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.0f} times" if factor >= 10 else f"{factor:.2g} times"
+
+
+def time_of(seconds: float) -> str:
+    """In the unit that reads best."""
+    unit, size = next(((u, n) for u, n in (("h", 3600.0), ("min", 60.0)) if seconds >= 2 * n), ("s", 1.0))
+    value = seconds / size
+    return f"{value:.0f} {unit}" if value >= 10 else f"{value:.2g} {unit}"
 
 
 def setting(c: Candidate) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..report.figures import figure_of, png
 from ..report.plot import colour
-from .choice import Choice
+from .choice import Choice, time_of
 
 SURE = {"high": "●●●", "medium": "●●○", "low": "●○○"}
 WIDTH, HEIGHT, NAMES = 1.45, 0.82, 1.4  # of a cell, and of the column of names [inches]
@@ -49,17 +49,10 @@ def _draw(axes: Any, c: Choice, column: int, row: int) -> None:
     if c.best is None:
         lines = ["nothing judged"]
     elif c.met:
-        lines = [f"{1e3 * c.best.spacing:.3g} mm, {_time(c.best.seconds)}", SURE[c.confidence]]
+        lines = [f"{1e3 * c.best.spacing:.3g} mm, {time_of(c.best.seconds)}", SURE[c.confidence]]
     else:
         lines = [f"nearest: {c.best.method.upper()}", f"{c.best.error:.1%} off"]
     head = c.best.method.upper() if c.best is not None and c.met else "none"
     axes.text(column + 0.5, row + 0.30, head, ha="center", va="center", fontsize=12, weight="bold")
     for i, line in enumerate(lines):
         axes.text(column + 0.5, row + 0.57 + 0.23 * i, line, ha="center", va="center", fontsize=9)
-
-
-def _time(seconds: float) -> str:
-    """In the unit that reads best."""
-    unit, size = next(((u, n) for u, n in (("h", 3600.0), ("min", 60.0)) if seconds >= 2 * n), ("s", 1.0))
-    value = seconds / size
-    return f"{value:.0f} {unit}" if value >= 10 else f"{value:.2g} {unit}"

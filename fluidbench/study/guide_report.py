@@ -10,7 +10,7 @@ from typing import Any
 from ..report.report import Detail, Image, Report, machine_of
 from ..report.table import Table
 from .again import command_of
-from .choice import Choice, choices, setting
+from .choice import Choice, choices, setting, time_of
 from .guide_chart import SURE, chart
 from .selection import Selection
 
@@ -96,7 +96,7 @@ def _table(found: Sequence[Choice], machines: Sequence[str], tolerances: Sequenc
 def _cell(c: Choice) -> list[str]:
     if c.best is None:
         return [f"none: {c.why}"]
-    cost = f"{c.best.seconds:.2g} s, {c.best.error:.1%} off"
+    cost = f"{time_of(c.best.seconds)}, {c.best.error:.1%} off"
     return [f"{setting(c.best)} {SURE[c.confidence]}", cost] if c.met else ["none", f"{setting(c.best)}: {cost}"]
 
 
@@ -130,7 +130,7 @@ def _detail(studies: Studies, found: Sequence[Choice], job: str, root: Path) -> 
                 sure.setdefault(c.sure, []).append(c)
         made.lines += [f"{machine}, within {_percents(cs)}: confidence {line}." for line, cs in sure.items()]
         own = sorted(jobs[job].candidates, key=lambda c: c.seconds)
-        tried = (f"{setting(c)}: {c.error:.1%}, {c.seconds:.3g} s" for c in own)
+        tried = (f"{setting(c)}: {c.error:.1%}, {time_of(c.seconds)}" for c in own)
         made.lines += [f"{machine}: error and time of everything tried: {'; '.join(tried)}."] if own else []
         made.lines += [f"{machine}: {note}." for note in jobs[job].remarks]
         for run in jobs[job].runs:

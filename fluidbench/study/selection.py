@@ -224,11 +224,13 @@ def averages(measured: Sequence[Measured]) -> dict[str, float]:
 
 
 def _unconverged(result: Selection, method: str) -> str:
-    """That a method's error does not fall, with the errors."""
+    """Why a method's limit may be anything, with its errors."""
     own = sorted((c for c in result.candidates if c.method == method), key=lambda c: -c.spacing)
     errors = ", ".join(f"{100 * c.discretisation:.1f}" for c in own)
     spacings = ", ".join(f"{1e3 * c.spacing:.3g}" for c in own)
-    return f"{method}: not converged: its error does not fall with the spacing ({errors} % at {spacings} mm)"
+    scatters = "a length scatters by as much as the spacing explains of it"
+    why = scatters if method in result.erratic else "its error does not fall with the spacing"
+    return f"{method}: not converged: {why} (errors {errors} % at {spacings} mm)"
 
 
 @dataclass(frozen=True)

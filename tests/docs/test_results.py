@@ -9,6 +9,7 @@ from fluidbench.errors import UserError
 from fluidbench.paper.archive import NAME, archives, keep, restore
 from fluidbench.paper.definitions import OPEN
 from fluidbench.paper.table1 import published
+from fluidbench.study import guide
 
 INDEX = f"{NAME}.json"
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
@@ -56,6 +57,13 @@ def test_a_verdict_that_does_not_follow_is_seen(tmp_path):
             object.__setattr__(trial.finding, "error", 0.0)
     keep(e, tmp_path)
     assert published(tmp_path).report.files["table1.md"] != published(place).report.files["table1.md"]
+
+
+def test_the_published_guide_is_what_the_rules_make_of_the_records():
+    made = guide.published(RESULTS)
+    assert (RESULTS / "guide.md").read_text() == made.report.files["guide.md"]
+    assert set(made.table.job) == set(guide.JOBS) and (RESULTS / "guide.png").read_bytes()[:4] == b"\x89PNG"
+    assert not any(run.folder.exists() for run in made.runs)  # no particles
 
 
 def test_what_holds_no_study_is_refused(tmp_path):

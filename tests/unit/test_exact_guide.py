@@ -8,9 +8,9 @@ from fluidbench.errors import UserError
 from fluidbench.report.figures import figure_of
 from fluidbench.runs.archive import where
 from fluidbench.scenario.measured import Measured
-from fluidbench.study.choice import choices
+from fluidbench.study.choice import choices, time_of
 from fluidbench.study.guide import JOBS, NAME, guide, published, subjects_of, tolerances_of
-from fluidbench.study.guide_chart import _time, chart
+from fluidbench.study.guide_chart import chart
 from fluidbench.study.guide_report import report, sentence
 from fluidbench.study.selection import Candidate, Selection, Trust
 from fluidbench.study.workplace import cores
@@ -52,8 +52,7 @@ def test_a_choice_says_when_it_rests_on_the_consensus():
     (one,) = chosen(found, 0.1)
     assert one.best.method == "mpm" and one.confidence == "low"
     assert one.change == (
-        "PBD at 2 mm is 23% off; "
-        "PBD at 2 mm at 0.2 of the time, if its own limit is the right one (20% from the consensus)"
+        "PBD at 2 mm is 23% off; PBD at 2 mm in 1 s, if its own limit is the right one (20% from the consensus)"
     )
     assert chosen(selection(("mpm", 2, 5.0, 0.05, 0.0)), 0.1)[0].change == "no other method was judged"
 
@@ -75,7 +74,7 @@ def test_a_sentence_puts_together_what_is_the_same():
 
 
 def test_times_read_in_their_unit():
-    assert [_time(t) for t in (0.123, 45.0, 119.0, 120.0, 7199.0, 7200.0)] == (
+    assert [time_of(t) for t in (0.123, 45.0, 119.0, 120.0, 7199.0, 7200.0)] == (
         ["0.12 s", "45 s", "119 s", "2 min", "120 min", "2 h"]
     )
 
