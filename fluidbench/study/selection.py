@@ -2,10 +2,10 @@
 
 A scenario without an exact answer gets its error estimated in three parts, all relative to a length:
 
-- discretisation: each length is extrapolated within a method to zero spacing at first order (what these methods show on
-  extrusion), by least squares over all spacings run, the finer ones counting more; where a line foretells a spacing
-  that is left out no better than the mean does, its slope is noise, and the mean is the limit; the error at a spacing
-  is the distance to that limit, or the scatter about the fit from there down if that is larger;
+- discretisation: each length is extrapolated within a method to zero spacing by least squares over all spacings run,
+  the finer ones counting more: at first or at second order, or not at all, whichever foretells each spacing best from
+  the others (where it is not at all, a slope would be noise, and the mean is the limit); the error at a spacing is the
+  distance to that limit, or the scatter about the fit from there down if that is larger;
 - bias: the distance of a method's limit from the consensus, the mean limit of the trusted methods;
 - trust: a method is trusted when it passes most known answers of the scenario's own physics
   (scenarios/reference/known_answers.csv, made by `fluidbench validate`).
@@ -31,6 +31,8 @@ from .lengths import lengths_of
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
 FINEST = 0.5  # and on a GPU
+
+ORDERS = (0, 1, 2)  # in the spacing, that a length may have
 
 ENOUGH = 3  # spacings needed for an extrapolation
 
@@ -235,18 +237,19 @@ def _unconverged(result: Selection, method: str) -> str:
 
 @dataclass(frozen=True)
 class Fit:
-    """A length as limit + slope d: its limit at zero spacing, and its distance from the fit at each spacing; no slope
-    where it is not known."""
+    """A length as limit + slope d^order: its limit at zero spacing, and its distance from the fit at each spacing; no
+    slope at order 0."""
 
     limit: float
     slope: float
     residual: dict[float, float]
+    order: int = 1
 
     @property
     def explains(self) -> bool:
-        """Whether the line says more of the length than chance: its distances from it are small beside what it rises
+        """Whether the fit says more of the length than chance: its distances from it are small beside what it rises
         over the spacings, or beside the length itself."""
-        rise = abs(self.slope) * (max(self.residual) - min(self.residual))
+        rise = abs(self.slope) * (max(self.residual) ** self.order - min(self.residual) ** self.order)
         return max(self.residual.values()) <= max(0.5 * rise, NOISE * abs(self.limit))
 
     def scatter(self, spacing: float) -> float:
@@ -255,19 +258,22 @@ class Fit:
 
 
 def extrapolate(runs: Sequence[Run], key: str) -> Fit:
-    """First order in the spacing, or none: whichever foretells each spacing better from the others. Weighted by the
-    inverse spacing, since what a length scatters by falls with it."""
+    """At the one of ORDERS that foretells each spacing best from the others. Weighted by the inverse spacing, since
+    what a length scatters by falls with it."""
     d = np.array([r.record.spacing_m for r in runs])
     q = np.array([lengths_of(r.record)[key] for r in runs])
-    slope, limit = _line(d, q, min((0, 1), key=lambda order: _missed(d, q, order)))
-    residual = np.abs(q - (slope * d + limit))
-    return Fit(float(limit), float(slope), dict(zip(d.tolist(), residual.tolist(), strict=True)))
+    order = min(ORDERS, key=lambda order: _missed(d, q, order))
+    slope, limit = _line(d, q, order)
+    residual = np.abs(q - (slope * d**order + limit))
+    return Fit(limit, slope, dict(zip(d.tolist(), residual.tolist(), strict=True)), order)
 
 
 def _line(d: np.ndarray, q: np.ndarray, order: int) -> tuple[float, float]:
-    """(slope, value at d = 0) of a line through q, or of the level where `order` is 0."""
-    found = np.polyfit(d, q, order, w=1.0 / d)
-    return (0.0, float(found[0])) if order == 0 else (float(found[0]), float(found[1]))
+    """(slope, value at d = 0) of a line in d^order through q; of the level, where that is 0."""
+    if order == 0:
+        return 0.0, float(np.average(q, weights=d**-2.0))
+    slope, limit = np.polyfit(d**order, q, 1, w=1.0 / d)
+    return float(slope), float(limit)
 
 
 def _missed(d: np.ndarray, q: np.ndarray, order: int) -> float:
@@ -275,7 +281,7 @@ def _missed(d: np.ndarray, q: np.ndarray, order: int) -> float:
     total = 0.0
     for i in range(len(d)):
         slope, limit = _line(np.delete(d, i), np.delete(q, i), order)
-        total += float((q[i] - (slope * d[i] + limit)) / d[i]) ** 2
+        total += float((q[i] - (slope * d[i] ** order + limit)) / d[i]) ** 2
     return total
 
 
@@ -343,7 +349,7 @@ def confidence(result: Selection, tolerance: float, best: Candidate | None) -> s
     words = f"the limits of {' and '.join(judged)} differ by at most {widest:.1%}"
     taken = {best.method} if best is not None else set()
     if loose := [m for m in dict.fromkeys([*judged, *taken]) if not result.converges(m)]:
-        return f"low: {words}, but {' and '.join(loose)} is not converged"
+        return f"low: {words}, but {' and '.join(loose)} {'are' if len(loose) > 1 else 'is'} not converged"
     if taken <= set(judged):
         return f"{'high' if widest <= tolerance else 'medium'}: {words}"
     (method,) = taken

@@ -90,6 +90,10 @@ def test_a_slope_that_foretells_nothing_is_noise():
     noisy = [1.0 + 0.2 * a + e for a, e in zip(d, (0.01, -0.01, 0.01, -0.01), strict=True)]
     rising = extrapolate([run("mpm", a, height_m=b) for a, b in zip(d, noisy, strict=True)], "height_m")
     assert rising.slope == pytest.approx(0.2, abs=0.02) and rising.limit == pytest.approx(1.0, abs=0.03)
+    assert (level.order, rising.order) == (0, 1)
+    curved = extrapolate([run("mpm", a, height_m=1.0 + 0.2 * a * a) for a in d], "height_m")
+    assert curved.order == 2 and (curved.limit, curved.slope) == (pytest.approx(1.0), pytest.approx(0.2))
+    assert curved.explains and max(curved.residual.values()) < 1e-9
 
 
 def test_one_spacing_that_is_far_too_wide_does_not_turn_the_limit_over():
