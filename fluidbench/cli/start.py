@@ -32,12 +32,14 @@ def init(
         default = suits.get(question.key, question.default)
         answer = default
         while not defaults:
-            answer = typer.prompt(f"{number}/{len(QUESTIONS)} {question.text}", default=default)
             try:
+                answer = typer.prompt(f"{number}/{len(QUESTIONS)} {question.text}", default=default)
                 check(question.key, answer)
                 break
             except UserError as error:
                 typer.echo(f"  {error}")
+            except typer.Abort:
+                raise UserError(f"question {number} was not answered; --defaults asks none") from None
         answers[question.key] = answer
         if question.key == "material":
             suits = suited(answer)
@@ -45,4 +47,4 @@ def init(
     typer.echo(f"written: {file}")
     for line in outlook(load(file)):
         typer.echo(line)
-    typer.echo(f"next: fluidbench show {file} --path; fluidbench compare {file}; fluidbench select {file} --within 8m")
+    typer.echo(f"next: fluidbench show {file} --path; fluidbench compare {file}; fluidbench select {file} --within 6m")

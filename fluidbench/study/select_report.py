@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..report.plot import Plot, Trace, colour
 from ..report.report import Report, machine_of, record_link
-from ..report.table import Table, number
+from ..report.table import Table, number, readable
 from ..scenario import Scenario
 from .selection import Candidate, Selection, confidence, physics_of
 
@@ -55,11 +55,13 @@ def _findings(
     best, why = chosen.recommend(tolerance, budget, pace)
     if best is None:
         return [f"No recommendation: {why}.", *chosen.remarks]
-    lines = [f"Tolerance {100 * tolerance:.3g} %; budget: {_budget(budget, pace)}."]
-    lines.append(f"Recommended: {_words(best)}." + (f" But {why}." if why else ""))
-    lines.append(
-        f"Run it: fluidbench run {name} --solver {best.method} --spacing {best.spacing:.6g}{best.run.target.alone}"
-    )
+    lines = [f"Tolerance {100 * tolerance:.3g} %; budget of a run: {_budget(budget, pace)}."]
+    lines.append(f"{f'{why[0].upper()}{why[1:]}' if why else 'Recommended'}: {_words(best)}.")
+    trust = chosen.trust.get(best.method)
+    if trust is not None and not trust.trusted:
+        lines.append(f"Beware: {best.method} passes {trust.passed} of {trust.judged} known answers of this physics.")
+    spacing = f"{1e3 * best.spacing:.6g}mm"
+    lines.append(f"Run it: fluidbench run {name} --solver {best.method} --spacing {spacing}{best.run.target.alone}")
     finer = [c for c in chosen.candidates if c.error <= best.error / 2]
     faster = [c for c in chosen.candidates if c.seconds <= best.seconds / 2]
     if finer:
@@ -70,9 +72,10 @@ def _findings(
         lines.append(f"Twice as fast: {_words(min(faster, key=lambda c: c.error))}.")
     else:
         lines.append("Twice as fast: nothing tried.")
-    lines.append(
-        f"How sure: {confidence(chosen, tolerance, best)} (known answers: {', '.join(sorted(physics_of(scenario)))})."
-    )
+    sure = confidence(chosen, tolerance, best)
+    lines.append(f"How sure: {sure} (judged by known answers on {', '.join(sorted(physics_of(scenario)))}).")
+    if sure.startswith("low"):
+        lines.append("A length measured on a print settles it: --measured FILE.csv counts errors from that.")
     return [*lines, *chosen.remarks]
 
 
@@ -139,13 +142,16 @@ def _candidates(chosen: Selection, front: Sequence[Candidate]) -> Table:
 
 def _evidence(chosen: Selection) -> Table:
     keys = sorted({key for limits in chosen.limits.values() for key in limits})
+    known = {key: [limits[key] for limits in chosen.limits.values() if key in limits] for key in keys}
+    words = {key: readable(key, values) for key, values in known.items()}
     table = Table(
         "Limits at zero spacing, and trust",
-        ["method", *keys, "known answers passed", "trusted"],
-        note="limits: first order in the spacing; known answers of this physics: docs/validation.md",
+        ["method", *(title for title, _ in words.values()), "known answers passed", "trusted"],
+        note="known answers of this physics: docs/validation.md",
     )
     for method, trust in chosen.trust.items():
-        cells = [number(chosen.limits.get(method, {}).get(key, math.nan)) for key in keys]
+        own = chosen.limits.get(method, {})
+        cells = [number(factor * own.get(key, math.nan)) for key, (_, factor) in words.items()]
         table.rows.append([method, *cells, f"{trust.passed} of {trust.judged}", "yes" if trust.trusted else "no"])
     return table
 

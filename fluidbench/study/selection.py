@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..measure.order import departures
 from ..measure.reference import table as reference
 from ..method.verdict import lacking
 from ..runs.record import Run
@@ -171,12 +172,13 @@ def assess(
     """Errors of all candidates from finished runs, against what was `measured` where that is known; `untried` is what
     there was no time for."""
     told = averages(measured)
+    done = [run for run in runs if run.ok and not departures(run.record.measures)]
     result = Selection([], trust_of(scenario, methods), {}, list(runs), untried=list(untried), scenario=scenario)
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
-        own = [r for r in runs if r.ok and r.method == method]
+        own = [r for r in done if r.method == method]
         if len(own) < ENOUGH:
-            result.notes.append(f"{method}: only {len(own)} spacings completed, {ENOUGH} are needed")
+            result.notes.append(f"{method}: only {len(own)} spacings completed with their volume, {ENOUGH} are needed")
             continue
         every = [lengths_of(r.record) for r in own]
         shared = [key for key in every[0] if all(key in lengths for lengths in every)]
@@ -187,6 +189,7 @@ def assess(
         if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0]) | told):
             result.erratic.add(method)
     for run in runs:
+        result.notes += [f"{run.name}: left out: {line}" for line in departures(run.record.measures) if run.ok]
         if restless := [key for key in run.record.moving if key in lengths_of(run.record)]:
             still = f"at spacing {run.record.spacing_m:.4g} m"
             result.notes.append(f"{run.method} {still}: not at rest at the end: {', '.join(restless)}")
@@ -207,8 +210,8 @@ def assess(
         result.notes.append(
             f"the consensus is {judged[0]}'s own limit: it has no second witness, and its bias is not known"
         )
-    for run in runs:
-        if run.ok and run.method in fits:
+    for run in done:
+        if run.method in fits:
             made = _candidate(run, fits[run.method], consensus, told)
             result.candidates += [made] if made else []
             result.notes += [] if made else [f"{run.name}: has no length to be judged by"]
@@ -230,7 +233,7 @@ def _unconverged(result: Selection, method: str) -> str:
     own = sorted((c for c in result.candidates if c.method == method), key=lambda c: -c.spacing)
     errors = ", ".join(f"{100 * c.discretisation:.1f}" for c in own)
     spacings = ", ".join(f"{1e3 * c.spacing:.3g}" for c in own)
-    scatters = "a length scatters by as much as the spacing explains of it"
+    scatters = "a length scatters from spacing to spacing instead of settling"
     why = scatters if method in result.erratic else "its error does not fall with the spacing"
     return f"{method}: not converged: {why} (errors {errors} % at {spacings} mm)"
 
@@ -349,7 +352,7 @@ def confidence(result: Selection, tolerance: float, best: Candidate | None) -> s
     words = f"the limits of {' and '.join(judged)} differ by at most {widest:.1%}"
     taken = {best.method} if best is not None else set()
     if loose := [m for m in dict.fromkeys([*judged, *taken]) if not result.converges(m)]:
-        return f"low: {words}, but {' and '.join(loose)} {'are' if len(loose) > 1 else 'is'} not converged"
+        return f"low: {words}; not converged: {' and '.join(loose)}"
     if taken <= set(judged):
         return f"{'high' if widest <= tolerance else 'medium'}: {words}"
     (method,) = taken

@@ -193,7 +193,7 @@ def test_two_spacings_are_not_enough(monkeypatch):
     blown = [finished("sph", "diverged", spacing=4.0)]
     found = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + line("sph", 12.0, 0.1, (1.0, 2.0)) + blown)
     assert {c.method for c in found.candidates} == {"mpm"} and list(found.limits) == ["mpm"]
-    assert found.notes[0] == "sph: only 2 spacings completed, 3 are needed"
+    assert found.notes[0] == "sph: only 2 spacings completed with their volume, 3 are needed"
     assert "the consensus is mpm's own limit" in found.notes[1] and len(found.runs) == 6 and found.missing() == []
 
 
@@ -278,7 +278,7 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
     found = assess(BEAD, ["mpm", "sph", "pbd"], rows)
     assert confidence(found, tolerance, None) == sure
     found.erratic.add("sph")
-    assert confidence(found, tolerance, None) == f"low: {sure.partition(': ')[2]}, but sph is not converged"
+    assert confidence(found, tolerance, None) == f"low: {sure.partition(': ')[2]}; not converged: sph"
     trusting(monkeypatch)
     assert confidence(assess(BEAD, ["mpm"], line("mpm", 10.0, 0.2)), 1.0, None).startswith("low: no method passes")
     trusting(monkeypatch, "mpm", "sph")
@@ -299,7 +299,7 @@ def test_confidence_is_that_of_the_setting_chosen(monkeypatch):
     known = "pbd passes 0 of 1 known answers of this physics"
     assert sure(line("pbd", 10.0, 0.2)) == [f"high: {words}", f"medium: {words}; {known}"]
     scattered = [run("pbd", d, height_m=h) for d, h in ((1.0, 10.0), (2.0, 12.0), (4.0, 9.0))]
-    assert sure(scattered) == [f"high: {words}", f"low: {words}, but pbd is not converged"]
+    assert sure(scattered) == [f"high: {words}", f"low: {words}; not converged: pbd"]
 
 
 def test_a_method_that_was_not_judged_is_not_said_to_fail(monkeypatch):
@@ -312,6 +312,18 @@ def test_a_method_that_was_not_judged_is_not_said_to_fail(monkeypatch):
     nobody = assess(BEAD, ["mpm", "sph", "pbd"], line("pbd", 10.0, 0.2))
     why = "mpm and sph, which pass most known answers of this physics, were not judged here"
     assert confidence(nobody, 0.1, None) == f"low: {why}" and f"{why}: the consensus is the mean of all" in nobody.notes
+
+
+def test_what_has_lost_its_volume_is_no_evidence(monkeypatch):
+    trusting(monkeypatch, "mpm", "sph")
+    loose = [
+        run("mpm", d, height_m=h, packing=p) for d, h, p in ((4.0, 10.0, 1.0), (2.0, 10.0, 0.95), (1.0, 12.0, 0.8))
+    ]
+    found = assess(BEAD, ["mpm", "sph"], loose + line("sph", 10.0, 0.1))
+    assert found.witnesses() == ["sph"] and {c.method for c in found.candidates} == {"sph"}
+    assert "mpm: only 2 spacings completed with their volume, 3 are needed" in found.notes
+    (why,) = [note for note in found.notes if "left out" in note]
+    assert "0.8 times as dense as at rest" in why
 
 
 def test_what_has_no_length_is_no_candidate(monkeypatch):

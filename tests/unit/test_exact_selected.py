@@ -27,19 +27,19 @@ def words(found, tolerance=0.2, budget=math.inf, pace=math.inf):
 def test_findings_name_the_best_and_what_twice_would_take():
     found = made((1.0, 8.0, 0.1), (2.0, 4.0, 0.2), (4.0, 2.0, 0.4))
     lines = words(found)
-    assert lines[0] == "Tolerance 20 %; budget: none."
+    assert lines[0] == "Tolerance 20 %; budget of a run: none."
     assert lines[1] == (
         "Recommended: mpm at spacing 2000 mm (mean dt 0.0001 s): error 20.0% (discretisation 20.0%, bias 0.0%), 4 s, "
         "40 s per simulated s."
     )
-    assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2 --threads 1"
+    assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2000mm --threads 1"
     assert lines[3].startswith("Twice as accurate: mpm at spacing 1000 mm") and lines[4].startswith(
         "Twice as fast: mpm at spacing 4000 mm"
     )
-    assert lines[5].endswith("(known answers: emission, yield stress).")
+    assert lines[5].endswith("(judged by known answers on emission, yield stress).")
     finest = words(found, 0.1, 60.0, 1.5)
-    assert finest[0] == "Tolerance 10 %; budget: 60 s and 1.5 s per simulated s."
-    assert "But nothing within the tolerance meets the budget; this is the fastest." in finest[1]
+    assert finest[0] == "Tolerance 10 %; budget of a run: 60 s and 1.5 s per simulated s."
+    assert finest[1].startswith("Nothing within the tolerance meets the budget; this is the fastest: ")
     assert finest[3] == (
         "Twice as accurate: nothing tried; at its observed order of 1 it takes 0.5 of the spacing, 16 times the work."
     )
