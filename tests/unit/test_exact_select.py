@@ -12,15 +12,14 @@ from fluidbench.measure.reference import Answer
 from fluidbench.method.target import Target
 from fluidbench.scenario.library import load
 from fluidbench.study import selection as module
+from fluidbench.study.fit import Fit, extrapolate
 from fluidbench.study.select import candidates, select
 from fluidbench.study.selection import (
     Candidate,
-    Fit,
     Selection,
     Trust,
     assess,
     confidence,
-    extrapolate,
     physics_of,
     trust_of,
 )
