@@ -8,7 +8,7 @@ from ..method.frame import CARRIED, Frame
 from ..scenario import Scenario
 
 DEPARTED = 0.05  # of mean density from rest, beyond which a run says so
-LOOSE = 0.1  # the same of packing, which is known to a few per cent
+LOOSE = 0.1  # the same of packing, which is known to a few per cent, from mean density
 TURN = (0.2, 0.25, 0.3)  # of the cells in which packing is told, about the axes [rad]
 DEPTH, LEAST, MOST = 2, 300, 4_000_000  # cells below a surface, and of how many packing is told
 CELL = 2.0  # edge of the cells in which particles are counted, in spacings
@@ -70,11 +70,12 @@ def packing(place: np.ndarray, volume: np.ndarray) -> float | None:
 
 def departures(measures: dict[str, float]) -> list[str]:
     """What is to be said of matter that has lost or gained volume."""
-    mean, packed = measures.get("mean_density", 1.0), measures.get("packing", 1.0)
+    mean = measures.get("mean_density", 1.0)
+    packed = measures.get("packing", mean)
     told = []
     if abs(mean - 1.0) > DEPARTED:
         told.append(f"its mean density is {mean:.3g} of that at rest: its volume is not to be trusted")
-    if abs(packed - 1.0) > LOOSE:
+    if abs(packed - mean) > LOOSE * mean:
         told.append(
             f"by where its particles are it is {packed:.3g} times as dense as at rest (the method takes it for "
             f"{mean:.3g}): its volume is not to be trusted"

@@ -66,6 +66,7 @@ def test_a_method_that_takes_loose_matter_for_dense_is_found_out():
     (line,) = departures({"mean_density": 1.001, "packing": 0.8})
     assert line.startswith("by where its particles are it is 0.8 times as dense as at rest (the method takes it for 1)")
     assert departures({"mean_density": 1.0, "packing": 0.91}) == []
+    assert len(departures({"mean_density": 1.2, "packing": 1.2})) == 1  # a solid that is pressed together, and knows it
 
 
 @pytest.mark.parametrize(("mean", "said"), [(1.0, 0), (1.049, 0), (0.94, 1), (1.06, 1)])
