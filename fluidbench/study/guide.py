@@ -119,7 +119,7 @@ def _concluded(studies: dict[str, dict[str, Selection]], tolerances: Sequence[fl
 
 def tolerances_of(given: Any) -> list[float]:
     """From the least to the largest; raises UserError for what is none."""
-    found = [given] if isinstance(given, int | float) else list(given)
+    found = list(given) if isinstance(given, Iterable) else [given]
     for one in found:
         require_number(one, "tolerance", 1e-6)
     if not found:

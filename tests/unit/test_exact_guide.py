@@ -177,7 +177,7 @@ def test_what_was_measured_counts(tmp_path, monkeypatch):
     assert not made.table.met.any() and made.table.error.iloc[0] == pytest.approx(0.5, abs=0.02)
 
 
-@pytest.mark.parametrize("given", [[], [math.nan], [0.0], ["5%"], [0.05, -1.0]])
+@pytest.mark.parametrize("given", [[], [math.nan], [0.0], ["5%"], "5%", None, [0.05, -1.0]])
 def test_tolerances_are_numbers_above_nothing(given, tmp_path):
     for call in (lambda: guide([BEAD], tolerances=given, out=tmp_path), lambda: published(tmp_path, given)):
         with pytest.raises(UserError, match="tolerance"):
