@@ -81,8 +81,8 @@ def candidates(
     subjects: Mapping[str, Scenario], methods: Sequence[str], place: Workplace, within: float = math.inf
 ) -> dict[str, Planned]:
     """For each subject every method at the spacings that its scenario can have; finer or coarser where the whole study
-    has so much time [s]. Raises UserError for a scenario that cannot be tried at ENOUGH, where the time is not enough for
-    any, and for a time on a GPU."""
+    has so much time [s]. Raises UserError for a scenario that cannot be tried at ENOUGH, where the time is not enough
+    for any, and for a time on a GPU."""
     if within != math.inf:
         require_number(within, "within", 1.0)
     factors = FACTORS if place.target.device == "cpu" else (*FACTORS, FINEST)
