@@ -46,9 +46,9 @@ def packing(place: np.ndarray, volume: np.ndarray) -> float | None:
     """Rest volumes [m^3] of the particles at `place` [m], shape (n, 3), over the room that they take, where that is
     well within matter: density over that at rest, told by where particles are and by nothing that a method believes.
 
-    Matter is the cells of a mean spacing that hold a particle, gaps of one cell closed and hollows filled; well within
-    is DEPTH cells below its surface. Cells are turned against the axes, along which particles are often aligned. None
-    where fewer than LEAST cells are well within, or matter is strewn over too many.
+    Matter is the cells of a mean spacing that hold a particle, gaps of a cell or two closed; well within is DEPTH cells
+    below its surface, that of a hollow, too, which may be meant. Cells are turned against the axes, along which
+    particles are often aligned. None where fewer than LEAST cells are well within, or matter is strewn over too many.
     """
     from scipy import ndimage
     from scipy.spatial.transform import Rotation
@@ -62,7 +62,7 @@ def packing(place: np.ndarray, volume: np.ndarray) -> float | None:
     flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
     held = np.bincount(flat, volume, int(np.prod(shape))).reshape(tuple(shape))
     beside = np.ones((3, 3, 3), dtype=bool)
-    matter = ndimage.binary_fill_holes(ndimage.binary_closing(held > 0, beside))
+    matter = ndimage.binary_closing(held > 0, beside)
     within = np.asarray(ndimage.binary_erosion(matter, beside, iterations=DEPTH), dtype=bool)
     count = int(within.sum())
     return float(held[within].sum()) / (count * edge**3) if count >= LEAST else None
