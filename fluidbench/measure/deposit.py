@@ -9,6 +9,7 @@ from ..scenario import Domain
 
 HALF = 0.5  # the surface of the deposit is where half of the space is filled
 FINE = 4  # sections are sampled this many times finer than the field
+PLANES = 5  # over which a section is averaged
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,20 @@ class Deposit:
 
         return spline_filter(self.fill, order=3, mode="nearest")
 
-    def sample(self, points: np.ndarray) -> np.ndarray:
-        """Fill at points of shape (..., 3) [m] by a cubic spline through the cells; the outermost extend outwards."""
-        from scipy.ndimage import map_coordinates
+    def plane(self, points: np.ndarray, up: np.ndarray) -> np.ndarray:
+        """Fill (n, m) by a cubic spline through the cells, the outermost of which extend outwards: at n places (x, y)
+        [m], each the mean of k points (n, k, 2), and at m heights `up` (m,) [m]."""
+        from scipy.sparse import csr_array
 
-        place = np.moveaxis((points - self.origin) / self.spacing, -1, 0)
-        return map_coordinates(self._spline, place, order=3, mode="nearest", prefilter=False)
+        n, k, _ = points.shape
+        x, y = np.moveaxis((points - self.origin[:2]) / self.spacing, -1, 0)
+        (i, wi), (j, wj), (z, wz) = map(_taps, (x, y, (up - self.origin[2]) / self.spacing), self.fill.shape)
+        columns = (i[..., :, None] * self.fill.shape[1] + j[..., None, :]).ravel()
+        weights = (wi[..., :, None] * wj[..., None, :]).ravel() / k
+        rows = np.arange(n + 1) * (16 * k)
+        flat = self._spline.reshape(-1, self.fill.shape[2])
+        layers = csr_array((weights, columns, rows), shape=(n, len(flat))) @ flat
+        return (layers[:, z] * wz).sum(axis=-1)
 
     def place(self, point: np.ndarray) -> np.ndarray:
         """Indices (i, j) of the column of cells that a point (x, y) [m] lies in; they may be beyond the field."""
@@ -93,6 +102,15 @@ class Deposit:
         above = profile[k + 1] if k + 1 < len(profile) else 0.0
         step = (profile[k] - HALF) / max(profile[k] - above, 1e-12)
         return float(self.origin[2] + (k + min(step, 1.0)) * self.spacing)
+
+
+def _taps(place: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """The four cells whose cubic B-splines reach a place [cells], and their weights: two arrays with one axis more."""
+    first = np.floor(place)
+    t = place - first
+    weight = np.stack([(1 - t) ** 3, 4 - 6 * t**2 + 3 * t**3, 1 + 3 * (t + t**2 - t**3), t**3], axis=-1) / 6
+    cell = first.astype(int)[..., None] + np.arange(-1, 3)
+    return np.clip(cell, 0, cells - 1), weight
 
 
 def _folded(fill: np.ndarray, start: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -163,11 +181,6 @@ def cut(
     normal = np.array([-direction[1], direction[0]])
     across = np.arange(-reach, reach, step) + step / 2
     up = np.arange(0.0, height, step) + step / 2
-    planes = []
-    for along in (-1.5, -0.75, 0.0, 0.75, 1.5):
-        centre = point + along * deposit.spacing * direction
-        points = np.empty((len(across), len(up), 3))
-        points[..., :2] = (centre + across[:, None] * normal)[:, None, :]
-        points[..., 2] = floor + up
-        planes.append(deposit.sample(points))
-    return Section(across, up, np.mean(planes, axis=0))
+    along = deposit.spacing * np.linspace(-1.5, 1.5, PLANES)
+    points = point + across[:, None, None] * normal + along[:, None] * direction
+    return Section(across, up, deposit.plane(points, floor + up))

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates, spline_filter
 
 from fluidbench.measure.deposit import Deposit, Section, cut
 from fluidbench.scenario import Domain
@@ -145,13 +146,26 @@ def grid_deposit(function, n=48, spacing=0.1):
     return Deposit(origin, spacing, function(places))
 
 
-def test_sampling_is_exact_for_polynomials_and_extends_outwards():
+def test_planes_are_exact_for_polynomials_and_extend_outwards():
     deposit = grid_deposit(lambda p: 1 + 2 * p[..., 0] - 3 * p[..., 1] + 0.5 * p[..., 2] ** 2)
-    points = np.array([[2.43, 0.37, 3.31], [2.2, 0.11, 3.47]])
-    expected = 1 + 2 * points[:, 0] - 3 * points[:, 1] + 0.5 * points[:, 2] ** 2
-    assert deposit.sample(points) == pytest.approx(expected, rel=1e-9)
+    points, up = np.array([[[2.43, 0.37]], [[2.2, 0.11]]]), np.array([3.31, 3.47, 3.6])
+    expected = 1 + 2 * points[..., 0] - 3 * points[..., 1] + 0.5 * up**2
+    assert deposit.plane(points, up) == pytest.approx(expected, rel=1e-9)
     full = grid_deposit(lambda p: np.ones(p.shape[:-1]))
-    assert full.sample(np.array([[-5.0, 9.0, 0.0]])) == pytest.approx([1.0], abs=1e-9)
+    assert full.plane(np.array([[[-5.0, 9.0]]]), np.array([0.0])) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_planes_are_what_scipy_makes_of_the_same_cells():
+    """At places within and beyond the field, averaged over three points each."""
+    rng = np.random.default_rng(4)
+    deposit = Deposit(np.array([0.1, -0.2, 0.3]), 0.5, rng.random((7, 4, 5)))
+    points, up = rng.uniform(-1.0, 5.0, (11, 3, 2)), rng.uniform(-1.0, 4.0, 6)
+    places = np.empty((11, 3, 6, 3))
+    places[..., :2], places[..., 2] = points[:, :, None], up
+    index = np.moveaxis((places - deposit.origin) / 0.5, -1, 0)
+    coefficients = spline_filter(deposit.fill, order=3, mode="nearest")
+    expected = map_coordinates(coefficients, index, order=3, mode="nearest", prefilter=False).mean(axis=1)
+    assert deposit.plane(points, up) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_cut_lies_square_to_its_direction_and_rises_from_the_floor():
