@@ -255,6 +255,12 @@ def table2(
     solvers: Solvers = "mpm",
     from_: From = None,
     pools: Annotated[str, typer.Option(help="pool sizes to preallocate; `fit` is as many as needed")] = "fit,298000",
+    variants: Annotated[
+        str | None,
+        typer.Option(
+            help="towers, separated by commas: plain, curing, expansion, expansion + curing, ...; default all"
+        ),
+    ] = None,
     repeats: Annotated[int, typer.Option(min=1, help="runs of each row, without and with pictures")] = 5,
     quick: Quick = False,
     *,
@@ -271,5 +277,6 @@ def table2(
         finish(published(from_, placed(options, "table2-published").get("out")))
         return
     sizes = [None if part == "fit" else count_of(part, "--pools") for part in names_in(pools, "--pools", "pool")]
-    more = placed(options, "table2")
-    finish(study(methods_in(solvers), pools=sizes, repeats=repeats_of(repeats), quick=quick, **more))
+    towers = None if variants is None else names_in(variants, "--variants", "variant")
+    more = placed(options, "table2") | {"pools": sizes, "variants": towers}
+    finish(study(methods_in(solvers), repeats=repeats_of(repeats), quick=quick, **more))

@@ -160,7 +160,7 @@ class Simulation(Session):
     def _run_tick(self, feeding: bool, steps: Plan) -> None:
         """The audit, what happens to the material, and the substeps: replayed, but the first time in a process and
         where births need the host."""
-        on_cpu, births = self.scene.device.is_cpu, self.growing is not None and self.growing.births
+        on_cpu, births = self.scene.device.is_cpu, self._births_due()
         audited, self.unseen = self.unseen or on_cpu, False  # on a GPU what nobody has looked at since is ours
         if not self._use_graphs or self.aged == 0 or births:
             if audited:
@@ -205,14 +205,24 @@ class Simulation(Session):
                 self.emission.feed()
             if self.growing is not None:
                 self.growing.grow()
-                if self.growing.give_birth(self.now):
-                    self.solver.settle()
+                if self._births_due() and self.growing.give_birth(self.now):
+                    self._settle()
             if self.curing is not None:
                 self.curing.ripen()
             if self.scene.carriage is not None:
                 self.scene.carriage.follow()
         if self.scene.crew.leading:
             self.process_launches = max(self.process_launches, counted.count)
+
+    def _births_due(self) -> bool:
+        return self.growing is not None and self.growing.due(self.done)
+
+    def _settle(self) -> None:
+        """Let the solver make room for what was born."""
+        if self._use_graphs:
+            self.scene.crew.run("settle", self.solver.settle)
+        else:
+            self.solver.settle()
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""

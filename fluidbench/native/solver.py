@@ -63,8 +63,8 @@ class Solver(Method):
         first time outside any graph, later recorded like `substep`."""
 
     def settle(self) -> None:
-        """Called when parents have had children, which lie over others: between substeps, never recorded. A method
-        whose pressure is finite lets it push them apart."""
+        """Enqueue, between substeps and recorded like them, when parents have had children, which lie over others. A
+        method whose pressure is finite lets it push them apart."""
 
     def carried(self) -> dict[str, Any]:
         """Arrays beyond the pool's that later substeps depend on, by name: what a checkpoint must hold."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import mean, stdev
 
+from ..errors import UserError, quoted, suggestion
 from ..measure.reference import table
 from ..method.verdict import lacking
 from ..runs.job import Job
@@ -71,14 +72,24 @@ class Row:
         return lacking([*self.bare, *self.filmed])
 
 
-def rows_of(methods: Sequence[str], pools: Sequence[int | None]) -> list[Row]:
+def variants_of(names: Sequence[str] | None) -> list[str]:
+    """Variants in the paper's order, None is all; raises UserError for a name that is none of theirs."""
+    for name in names or ():
+        if name not in VARIANTS:
+            raise UserError(f"variants: no {quoted(name)}{suggestion(name, VARIANTS)}")
+    return [name for name in VARIANTS if names is None or name in names]
+
+
+def rows_of(
+    methods: Sequence[str], pools: Sequence[int | None], variants: Sequence[str] = tuple(VARIANTS)
+) -> list[Row]:
     """As the paper has them: the plain tower in every pool, each other variant in the largest."""
     sizes = sorted(set(pools), key=lambda pool: pool or 0)
     return [
         Row(variant, pool, method)
         for method in methods
         for pool in sizes
-        for variant in VARIANTS
+        for variant in variants
         if variant == "plain" or pool == sizes[-1]
     ]
 

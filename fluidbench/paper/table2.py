@@ -11,7 +11,7 @@ from ..errors import UserError
 from ..runs import archive
 from ..study.result import Result
 from ..study.workplace import Options, Workplace, methods_of
-from .rows import Row, check_pools, printed, rows_of
+from .rows import Row, check_pools, printed, rows_of, variants_of
 from .table2_report import report
 
 WALL_LIMIT = 1800.0  # s
@@ -32,6 +32,7 @@ def table2(
     methods: Sequence[str] | None = ("mpm",),
     *,
     pools: Sequence[int | None] = (None, 298_000),
+    variants: Sequence[str] | None = None,
     repeats: int = 5,
     quick: bool = False,
     **options: Unpack[Options],
@@ -39,7 +40,8 @@ def table2(
     """Time the printed tower, feature by feature, with and without pictures; the paper's claims as verdicts.
 
     `methods` are names, None is all. `pools`: particles to preallocate; None is as many as needed. As in the paper, the
-    plain tower is run in all of them and every other in the largest. `repeats`: runs of each row, for the spread.
+    plain tower is run in all of them and every other in the largest. `variants`: those of VARIANTS that are wanted,
+    None is all. `repeats`: runs of each row, for the spread.
     `quick`: shorter towers. One run at a time, so that times [s] mean something. `options` are those of every verb, see
     Options.
 
@@ -48,7 +50,7 @@ def table2(
     names = methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     check_pools(pools, quick)
-    rows = rows_of(names, pools)
+    rows = rows_of(names, pools, variants_of(variants))
     planned = [work for row in rows for work in row.jobs(repeats, quick, place)]
     made = iter(place.run(planned, "table2"))
     for row in rows:
@@ -72,10 +74,10 @@ def published(folder: str | Path, out: str | Path | None = None) -> Table2:
 
 
 def _add(rows: list[Row], more: Sequence[Row], place: Path) -> None:
-    """Put the rows of one more study beside those of others; raises UserError for a second one of the same machine, and
-    for one of other towers."""
-    if {row.machine for row in rows} & {row.machine for row in more}:
-        raise UserError(f"{archive.shown(place)}: a second study of {more[0].machine}; each machine is shown once")
+    """Put the rows of one more study beside those of others; raises UserError for a second one of a method on the same
+    machine, and for one of other towers."""
+    for machine, method in {(row.machine, row.method) for row in rows} & {(row.machine, row.method) for row in more}:
+        raise UserError(f"{archive.shown(place)}: a second study of {method} on {machine}; each is shown once")
     if rows and more and rows[0].duration != more[0].duration:
         raise UserError(f"{archive.shown(place)}: its towers are not those of the other studies")
     rows += more

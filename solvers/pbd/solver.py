@@ -159,6 +159,7 @@ class SolverPBD(Solver):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
             self.correction = wp.zeros(pool.size, dtype=wp.vec3)
             self.still = wp.zeros(pool.size, dtype=wp.vec3)
+            self.spans = wp.zeros_like(scene.dt)
             self.fill = wp.ones(pool.size, dtype=float)
             self.places = wp.zeros(pool.size * PLACE // 4, dtype=wp.vec4)
             self.pushes = wp.zeros(pool.size * PUSH // 4, dtype=wp.vec4)
@@ -223,15 +224,16 @@ class SolverPBD(Solver):
     def settle(self) -> None:
         """What was born where others are is moved apart in no time: pushed in a substep it would be flung. All worlds
         of a batch are pressed, those without offspring by what little their density is off."""
+        scene = self.scene
         self.refresh()
-        spans = self.scene.dt.numpy().copy()
-        self.scene.dt.fill_(INSTANT * self.scene.spacing)
+        scene.crew.alone(lambda: wp.copy(self.spans, scene.dt))
+        scene.crew.alone(lambda: scene.dt.fill_(INSTANT * scene.spacing))
         for _ in range(SETTLING):
             self.predict()
             self.lists()  # what moves far in one iteration has other neighbours in the next
             self.constrain(1)
+        scene.crew.alone(lambda: wp.copy(scene.dt, self.spans))
         self.refresh()
-        self.scene.dt.assign(spans)
 
     def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
         self.backend.launch(kernel, self.pool.size, inputs, outputs)

@@ -5,7 +5,7 @@ import pytest
 from fluidbench.errors import UserError
 from fluidbench.method.target import Target
 from fluidbench.paper import table2_report as page
-from fluidbench.paper.rows import VARIANTS, Printed, Row, check_pools, claims, printed, spread
+from fluidbench.paper.rows import VARIANTS, Printed, Row, check_pools, claims, printed, rows_of, spread, variants_of
 from fluidbench.paper.table2 import NAME, keep, published, table2
 from fluidbench.paper.verdicts import CONFIRMED, OPEN, REFUTED
 from fluidbench.scenario.library import load
@@ -177,6 +177,26 @@ def test_the_papers_figures_stand_beside_ours():
     ]
 
 
+def test_some_variants_are_run_in_the_papers_order_and_no_others():
+    assert variants_of(None) == list(VARIANTS)
+    assert variants_of(["expansion + curing", "plain"]) == ["plain", "expansion + curing"]
+    rows = rows_of(["sph"], (None, 298_000), variants_of(["curing", "plain"]))
+    assert [(r.variant, r.pool) for r in rows] == [("plain", None), ("plain", 298_000), ("curing", 298_000)]
+    with pytest.raises(UserError, match="variants: no 'expansoin'; did you mean 'expansion'"):
+        variants_of(["expansoin"])
+
+
+def test_methods_on_one_machine_may_be_timed_in_studies_of_their_own(tmp_path):
+    other = row("plain", [9.0, 11.0], [4.0, 4.1])
+    made = [row("plain", [90.0, 110.0], [40.0, 41.0]), other]
+    other.method = "sph"
+    for i, run in enumerate(run for r in made for run in (*r.bare, *r.filmed)):
+        object.__setattr__(run, "folder", tmp_path / "runs" / str(i))
+    keep(made[:1], tmp_path / "one")
+    keep(made[1:], tmp_path / "other")
+    assert [r.method for r in published(tmp_path, tmp_path / "out").rows] == ["mpm", "sph"]
+
+
 def test_a_timing_is_told_again_from_what_it_keeps(tmp_path):
     made = [row("plain", [90.0, 110.0], [40.0, 41.0]), row("curing", [50.0, 51.0], [9.0, 9.5], pool=298_000)]
     for i, run in enumerate(run for r in made for run in (*r.bare, *r.filmed)):
@@ -186,7 +206,7 @@ def test_a_timing_is_told_again_from_what_it_keeps(tmp_path):
     assert again.report.files["table2.md"] == page.report(made, tmp_path).files["table2.md"]
     assert again.ok and [r.speed() for r in again.rows] == [r.speed() for r in made] and again.save().exists()
     keep(made, tmp_path / "other")
-    with pytest.raises(UserError, match="a second study of CPU"):
+    with pytest.raises(UserError, match="a second study of mpm on CPU"):
         published(tmp_path)
     for run in made[0].bare:
         change(run, machine={"device": "GPU"}, input={"duration": 9.0})

@@ -55,9 +55,10 @@ def conceive(
     born: wp.array(dtype=int),
     parent: wp.array(dtype=int),
     number: wp.array(dtype=int),
+    splitting: wp.array(dtype=int),
 ):
     """How many children each particle has now, 0 for none; all but the first get a place at the end of the pool. `born`
-    counts them by world, and after these the parents."""
+    counts them by world, and after these the parents, of whom those that split are listed in `splitting`."""
     i = wp.tid()
     world = i / capacity
     if i - world * capacity < count[world]:
@@ -76,7 +77,9 @@ def conceive(
                         children += 1
         offspring_count[i] = children
         if children > 0:
-            wp.atomic_add(born, born.shape[0] - 1, 1)
+            place_among_parents = wp.atomic_add(born, born.shape[0] - 1, 1)
+            if law.splits == 1:
+                splitting[place_among_parents] = i
         if children > 1:
             place = wp.atomic_add(born, world, children - 1)
             for c in range(1, children):

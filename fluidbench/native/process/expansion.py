@@ -15,9 +15,11 @@ from ..pool import Pool
 from ..scene import Scene
 from .births import FIRST_DRAW, BirthLaw, conceive, deliver, inherit
 from .chance import Chance, chance_of, uniform
-from .room import VIEW, find_room
+from .room import CANDIDATES, VIEW, crowd, take_room
 
 wp.set_module_options({"enable_backward": False})
+
+OVERDUE = 0.1  # of its volume: how much a particle may outgrow LARGEST before it splits, for the host waits for births
 
 
 @wp.kernel
@@ -74,6 +76,7 @@ class Growing:
         self.ancestors = ancestors
         self.law = self._birth_law(model, generations)
         self.births = model.kind == "spawn" or model.split
+        self.every = self._ticks_between(scene.scenario.schedule[0])
         if model.kind == "growth":
             pool.add_field("growth", float)
         if self.births:
@@ -85,7 +88,19 @@ class Growing:
                 self.born = wp.zeros(pool.worlds + 1, dtype=int)
                 self.old = wp.zeros(pool.worlds, dtype=int)
                 self.halfway = wp.zeros(pool.size * self.law.splits, dtype=wp.vec3)
+                self.splitting = wp.zeros(pool.size * self.law.splits, dtype=int)
                 self.room = wp.HashGrid(64, 64, 64) if self.law.splits else None
+
+    def _ticks_between(self, tick: float) -> int:
+        """Ticks from births to births: what grows may be late with its halves, what spawns may not."""
+        if self.model.kind == "spawn":
+            return 1
+        fastest = (self.model.ratio - 1.0) / self.model.time  # d ln R / dt as growth begins
+        return max(1, int(OVERDUE / max(fastest * tick, 1e-3)))
+
+    def due(self, tick: int) -> bool:
+        """Whether there may be births at the start of the tick of this number."""
+        return self.births and tick % self.every == 0
 
     def _birth_law(self, model: Expansion, generations: int) -> BirthLaw:
         d = self.scene.spacing
@@ -150,7 +165,7 @@ class Growing:
                 pool.volume,
                 pool.generation,
             ],
-            [self.offspring_count, self.born, self.parent, self.number],
+            [self.offspring_count, self.born, self.parent, self.number, self.splitting],
             device=device,
         )
         *each, parents = self.born.numpy().tolist()
@@ -160,7 +175,7 @@ class Growing:
         born = np.array(each)
         for world in range(pool.worlds):
             pool.need(world, int(born[world]))
-        self.find_room()
+        self.find_room(parents)
         self.old.assign(np.array(pool.counts, np.int32))
         if born.any():
             wp.launch(
@@ -191,26 +206,20 @@ class Growing:
         )
         return True
 
-    def find_room(self) -> None:
-        """Where the halves of what splits now will lie."""
+    def find_room(self, parents: int) -> None:
+        """Where the halves of what splits now will lie, of so many."""
         if self.room is None:
             return
-        pool, view = self.pool, VIEW * self.scene.spacing
+        pool, device, view = self.pool, self.scene.device, VIEW * self.scene.spacing
+        family = [self.splitting, pool.origin, pool.generation, pool.volume]
+        crowding = wp.empty((parents, CANDIDATES), dtype=float, device=device)
         for world, count in enumerate(pool.counts):
-            own = slice(world * pool.capacity, world * pool.capacity + count)
-            position = pool.position[own]
+            position = pool.position[world * pool.capacity : world * pool.capacity + count]
             self.room.build(position, view)
-            fields = (self.offspring_count, pool.origin, pool.generation, pool.volume)
-            wp.launch(
-                find_room,
-                count,
-                [self.room.id, self.chance, int(FIRST_DRAW), self.scene.box, view]
-                + [field[own] for field in fields]
-                + [position],
-                [self.halfway[own]],
-                device=self.scene.device,
-            )
+            place = [self.room.id, self.chance, int(FIRST_DRAW), self.scene.box, view, world, pool.capacity]
+            wp.launch(crowd, crowding.shape, [*place, *family, position], [crowding], device=device)
+        wp.launch(take_room, parents, [self.chance, int(FIRST_DRAW), *family, crowding], [self.halfway], device=device)
 
     def footprint(self) -> dict[str, int]:
-        names = ("offspring_count", "parent", "number", "born", "old", "halfway") if self.births else ()
+        names = ("offspring_count", "parent", "number", "born", "old", "halfway", "splitting") if self.births else ()
         return {name: getattr(self, name).capacity for name in names}

@@ -2,7 +2,8 @@
 
 Matter grows as its surroundings let it: a strand on a floor by its section alone, not along itself. Halves that lie
 anywhere leave gaps between families then, which a method takes for matter that is denser where the families are. Of
-CANDIDATES places, random ones, those are taken at which the half that sees more of others sees least.
+CANDIDATES places, random ones, those are taken at which the half that sees more of others sees least. Few split at a
+time: each place is a thread's.
 """
 
 import warp as wp
@@ -57,33 +58,58 @@ def seen_with_images(grid: wp.uint64, position: wp.array(dtype=wp.vec3), box: Bo
     return total
 
 
+@wp.func
+def candidate(chance: Chance, who: int, age: int, draw: int, k: int, edge: float):
+    """The k-th place of a half, from the centre of the whole [m], which has been `edge` long."""
+    away = edge * (NEAR + (FAR - NEAR) * uniform(chance, who, age, draw + 3 * k + 2))
+    return away * direction(chance, who, age, draw + 3 * k)
+
+
 @wp.kernel
-def find_room(
+def crowd(
     grid: wp.uint64,
     chance: Chance,
     draw: int,
     box: Box,
     view: float,
-    offspring_count: wp.array(dtype=int),
+    world: int,
+    capacity: int,
+    splitting: wp.array(dtype=int),
     origin: wp.array(dtype=int),
     generation: wp.array(dtype=int),
     volume: wp.array(dtype=float),
     position: wp.array(dtype=wp.vec3),
     # outputs
+    crowding: wp.array2d(dtype=float),
+):
+    """What the half that sees more of others sees, at each place that each particle of a world which splits now may
+    give to its halves; `position` is of that world."""
+    s, k = wp.tid()
+    i = splitting[s]
+    own = i - world * capacity
+    if own >= 0 and own < capacity:
+        way = candidate(chance, origin[i], generation[i], draw, k, wp.pow(volume[i], 1.0 / 3.0))
+        first = seen_with_images(grid, position, box, own, position[own] + way, view)
+        second = seen_with_images(grid, position, box, own, position[own] - way, view)
+        crowding[s, k] = wp.max(first, second) + nearness(2.0 * wp.length(way), view)
+
+
+@wp.kernel
+def take_room(
+    chance: Chance,
+    draw: int,
+    splitting: wp.array(dtype=int),
+    origin: wp.array(dtype=int),
+    generation: wp.array(dtype=int),
+    volume: wp.array(dtype=float),
+    crowding: wp.array2d(dtype=float),
+    # outputs
     halfway: wp.array(dtype=wp.vec3),
 ):
     """From the centre to the first half of each particle that splits now [m]; the other is as far on the other side."""
-    i = wp.tid()
-    if offspring_count[i] > 1:
-        who, age = origin[i], generation[i]
-        edge = wp.pow(volume[i], 1.0 / 3.0)
-        least = float(wp.inf)
-        for k in range(CANDIDATES):
-            away = edge * (NEAR + (FAR - NEAR) * uniform(chance, who, age, draw + 3 * k + 2))
-            way = away * direction(chance, who, age, draw + 3 * k)
-            first = seen_with_images(grid, position, box, i, position[i] + way, view)
-            second = seen_with_images(grid, position, box, i, position[i] - way, view)
-            score = wp.max(first, second) + nearness(2.0 * away, view)
-            if score < least:
-                least = score
-                halfway[i] = way
+    s = wp.tid()
+    i, best = splitting[s], int(0)
+    for k in range(1, CANDIDATES):
+        if crowding[s, k] < crowding[s, best]:
+            best = k
+    halfway[i] = candidate(chance, origin[i], generation[i], draw, best, wp.pow(volume[i], 1.0 / 3.0))
