@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from fluidbench.errors import UserError
+from fluidbench.paper import table2
 from fluidbench.paper.archive import NAME, archives, keep, restore
 from fluidbench.paper.definitions import OPEN
 from fluidbench.paper.table1 import published
@@ -63,6 +64,14 @@ def test_the_published_guide_is_what_the_rules_make_of_the_records():
     made = guide.published(RESULTS)
     assert (RESULTS / "guide.md").read_text() == made.report.files["guide.md"]
     assert set(made.table.job) == set(guide.JOBS) and (RESULTS / "guide.png").read_bytes()[:4] == b"\x89PNG"
+    assert not any(run.folder.exists() for run in made.runs)  # no particles
+
+
+def test_the_published_timing_is_what_the_rules_make_of_the_records():
+    made = table2.published(RESULTS)
+    assert (RESULTS / "table2.md").read_text() == made.report.files["table2.md"]
+    mpm = [row for row in made.rows if row.method == "mpm"]
+    assert len(mpm) == 6 and all(len(row.bare) >= 3 for row in mpm) and not made.missing
     assert not any(run.folder.exists() for run in made.runs)  # no particles
 
 
