@@ -79,9 +79,18 @@ def run_batches(task: Task) -> dict[str, Any]:
     target, limit = Target(**task["target"]), task["wall_limit"]
     method, batches = get_method(task["method"]), [[Scenario.model_validate(s) for s in b] for b in task["batches"]]
     readers = min(cores(), max(map(len, batches)))
-    with ProcessPoolExecutor(readers, get_context("spawn")) as pool:  # a fork would share the GPU's context
+    with ProcessPoolExecutor(readers, get_context("spawn"), wake) as pool:  # a fork would share the GPU's context
+        for _ in range(readers):
+            pool.submit(int)  # now, so that they wake while the session begins
         found = [_guarded(method, batch, target, limit, pool) for batch in batches]
     return {"machine": machine(target), "batches": found}
+
+
+def wake() -> None:
+    """Import what a reader needs."""
+    import pandas  # noqa: F401
+
+    from ..measure import ledger, order, tower  # noqa: F401
 
 
 def _guarded(
