@@ -15,7 +15,9 @@ from .tower import family_spread, is_tower, is_wall, measure_tower, progress, st
 def deposit_of(frame: Frame, scenario: Scenario) -> Deposit:
     """The deposited field of a snapshot, without what is still inside the nozzle."""
     free = is_out(frame, scenario)
-    return Deposit.of(frame["position"][free], frame["volume"][free], scenario.domain, scenario.spacing)
+    return Deposit.of(
+        frame["position"].compress(free, axis=0), frame["volume"][free], scenario.domain, scenario.spacing
+    )
 
 
 def ledger(frame: Frame, scenario: Scenario) -> dict[str, float]:
@@ -23,22 +25,31 @@ def ledger(frame: Frame, scenario: Scenario) -> dict[str, float]:
     in float64."""
     free = frame["held"] != CARRIED
     m = frame["mass"][free].astype(float)
-    x, v = frame["position"][free].astype(float), frame["velocity"][free].astype(float)
-    mass = float(m.sum())
+    x, v, spin = (
+        frame[key].compress(free, axis=0).T.astype(float, order="C") for key in ("position", "velocity", "spin")
+    )
+
+    def total(values: np.ndarray) -> np.ndarray:
+        return (m * values).sum(axis=-1)  # no product of matrices, whose threads wait for one another
+
+    mass, momentum, center = float(m.sum()), total(v), total(x)
     row = {"particles": int(free.sum()), "mass_kg": mass}
-    row |= {f"momentum_{axis}_kg_m_s": float(m @ v[:, i]) for i, axis in enumerate("xyz")}
-    turn = (m[:, None] * np.cross(x, v)).sum(axis=0) + frame["spin"][free].astype(float).sum(axis=0)
+    row |= {f"momentum_{axis}_kg_m_s": float(momentum[i]) for i, axis in enumerate("xyz")}
+    turn = [total(x[i - 2] * v[i - 1] - x[i - 1] * v[i - 2]) + spin[i].sum() for i in range(3)]
     row |= {f"angular_momentum_{axis}_kg_m2_s": float(turn[i]) for i, axis in enumerate("xyz")}
-    row["kinetic_energy_J"] = 0.5 * float(m @ (v * v).sum(axis=1))
-    row["potential_energy_J"] = -float(m @ scenario.potential_at(x))
-    row |= {f"center_{axis}_m": float(m @ x[:, i]) / mass if mass else 0.0 for i, axis in enumerate("xyz")}
+    row["kinetic_energy_J"] = 0.5 * float(total((v * v).sum(axis=0)))
+    row["potential_energy_J"] = -float(total(scenario.potential_at(x.T)))
+    row |= {f"center_{axis}_m": float(center[i]) / mass if mass else 0.0 for i, axis in enumerate("xyz")}
     return row
 
 
 def lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """Every length that the scenario calls for, all from the deposited field, with its resolution: a single bead's once
     the path has been travelled."""
-    deposit = deposit_of(frame, scenario)
+    return _lengths(frame, deposit_of(frame, scenario), scenario)
+
+
+def _lengths(frame: Frame, deposit: Deposit, scenario: Scenario) -> dict[str, float]:
     row = {"resolution_m": deposit.spacing, "top_m": deposit.top() - scenario.domain.lower[2]}
     row |= measure_slump(deposit, scenario)
     if is_tower(scenario):
@@ -78,9 +89,10 @@ def beads(frame: Frame, deposit: Deposit, scenario: Scenario) -> dict[str, float
 
 def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     """`lengths` and what only the finished print shows: beads and layers."""
-    row = lengths(frame, scenario)
+    deposit = deposit_of(frame, scenario)
+    row = _lengths(frame, deposit, scenario)
     if "bead_width_m" not in row:
-        row |= beads(frame, deposit_of(frame, scenario), scenario)
+        row |= beads(frame, deposit, scenario)
     free, path = is_out(frame, scenario), scenario.toolpath
     if path is not None and path.kind == "ring" and path.center is not None and path.speed > 0:
         center = np.average(frame["position"][free, :2], axis=0, weights=frame["mass"][free])

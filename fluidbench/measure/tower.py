@@ -181,10 +181,10 @@ def _path_coordinates(x: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, np
     along, across = np.zeros(len(x)), np.zeros(len(x))
     for start, leg, length, before in zip(corners, legs, lengths, np.cumsum(lengths) - lengths, strict=False):
         unit = leg / length
-        arm = x[:, :2] - start
-        s = np.clip(arm @ unit, 0.0, length)
-        distance = np.hypot(*(arm - s[:, None] * unit).T)
-        side = arm @ np.array([-unit[1], unit[0]])
+        dx, dy = x[:, 0] - start[0], x[:, 1] - start[1]
+        s = np.clip(dx * unit[0] + dy * unit[1], 0.0, length)
+        distance = np.hypot(dx - s * unit[0], dy - s * unit[1])
+        side = dy * unit[0] - dx * unit[1]
         near = distance < best
         best, along = np.where(near, distance, best), np.where(near, (before + s) / lengths.sum(), along)
         across = np.where(near, side, across)
@@ -234,7 +234,7 @@ def progress(frame: Frame, scenario: Scenario) -> dict[str, float]:
         return row
     if m.cure is not None:
         phase = frame["phase"][free]
-        row["mean_cure"] = float(phase @ mass / mass.sum() / m.cure.levels)
+        row["mean_cure"] = float((phase * mass).sum() / mass.sum() / m.cure.levels)
         row["cured_share"] = float(mass[phase >= 0.95 * m.cure.levels].sum() / mass.sum())
     if m.expansion is not None:
         row["volume_growth"] = float(frame["volume"][free].astype(float).sum() * m.density / mass.sum())

@@ -25,9 +25,11 @@ START = (
 
 
 def environment(gpu: str = "") -> dict[str, str]:
-    """The environment of a child: never the current folder on its path (PYTHONSAFEPATH), nothing of NOISE, and of the
-    GPUs only the one named, if one is."""
+    """The environment of a child: never the current folder on its path (PYTHONSAFEPATH), nothing of NOISE, numpy's
+    products on one thread unless told (others spin for cores that are timed), and of the GPUs only the one named, if
+    one is."""
     kept = {k: v for k, v in os.environ.items() if k not in NOISE} | {"PYTHONSAFEPATH": "1"}
+    kept = {"OPENBLAS_NUM_THREADS": "1"} | kept
     return kept | ({"CUDA_VISIBLE_DEVICES": gpu} if gpu else {})
 
 

@@ -164,7 +164,8 @@ class Scenario(Model):
     def potential_at(self, points: np.ndarray) -> np.ndarray:
         """Minus the potential energy per unit mass at points of shape (n, 3) [J/kg]."""
         arm = points - np.asarray(self.body_force_center)
-        return points @ self.acceleration + 0.5 * ((arm @ self.gradient) * arm).sum(axis=1)
+        uniform = (points * self.acceleration).sum(axis=1)
+        return uniform + 0.5 * np.einsum("ni,ij,nj->n", arm, self.gradient, arm)
 
     @cached_property
     def peak_acceleration(self) -> float:

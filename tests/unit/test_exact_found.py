@@ -16,8 +16,8 @@ def test_rows_of_the_tower_are_called_by_their_variant(tmp_path, monkeypatch):
     """study/table2.py, table2(): the inner loop takes `variant` for the job's, so every row is called `pictures`, and
     no claim that compares variants is ever judged."""
     working(monkeypatch)
-    rows = table2(["mpm"], pools=[None], repeats=2, quick=True, out=tmp_path, progress=False).rows
-    assert [r.variant for r in rows] == list(VARIANTS)
+    rows = table2(["mpm"], pools=[None, 400_000], repeats=2, quick=True, out=tmp_path, progress=False).rows
+    assert [r.variant for r in rows] == ["plain", *VARIANTS]
     assert len(module.claims(rows)) == 4
 
 
