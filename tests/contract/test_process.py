@@ -83,6 +83,18 @@ def test_spawned_foam_keeps_its_momentum_and_is_not_flung():
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_births_come_to_the_same_replayed_and_launched_one_by_one(method):
+    grows = foam({"expansion": {"ratio": 6.0, "time": 0.05}})
+    replayed, launched = (Simulation(grows, method, graphs=graphs) for graphs in (True, False))
+    ends = []
+    for sim in (replayed, launched):
+        assert drive(sim).verdict == "completed"
+        ends.append(sim.frame())
+    assert len(ends[0]["mass"]) > 64
+    assert all((ends[0][name] == ends[1][name]).all() for name in ("position", "velocity", "volume", "origin"))
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_growth_without_splitting_keeps_its_particles(method):
     before, after, _ = ran(foam({"expansion": {"ratio": 1.4, "time": 0.05, "split": False}}), method)
     assert len(after["mass"]) == len(before["mass"]) and (after["mass"] == before["mass"]).all()

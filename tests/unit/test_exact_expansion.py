@@ -17,13 +17,16 @@ D = 0.01
 VELOCITY = [0.1, -0.2, 0.3]
 
 
-def growing(model, side=4, center=(0.05, 0.1, 0.1), generations=3, capacity=20_000, worlds=1, seed=0, **fields):
+def growing(
+    model, side=4, center=(0.05, 0.1, 0.1), generations=3, capacity=20_000, worlds=1, seed=0, tick=None, **fields
+):
     """A cube of side^3 particles of 1 cm^3 each, and what makes them grow."""
     body = {"kind": "box", "center": list(center), "size": [D * side] * 3, "velocity": VELOCITY}
     material = {"density": 1000.0, "youngs_modulus": 1e3, "expansion": model}
     walls = {"x_lower": "periodic", "x_upper": "periodic"}
     domain = {"lower": [-0.05, 0.0, 0.0], "upper": [0.15, 0.3, 0.4], "walls": walls}
-    s = scenario(bodies=[body], material=material, domain=domain, spacing=D, seed=seed)
+    timing = {} if tick is None else {"tick": tick, "duration": 10 * tick, "output_interval": 10 * tick}
+    s = scenario(bodies=[body], material=material, domain=domain, spacing=D, seed=seed, **timing)
     pool = Pool(Scene([s] * worlds), capacity)
     grown = Growing(pool.scene, pool, side**3, generations)
     Placement(s, pool)
@@ -116,6 +119,23 @@ def test_what_has_outgrown_the_spacing_is_halved_in_place():
             )
             assert after["mass"][slot] == pytest.approx(1000.0 * D**3 / 2)
             assert after["generation"][slot] == before["generation"][i] + 1
+
+
+@pytest.mark.parametrize(
+    ("model", "tick", "every"),
+    [
+        ({"ratio": 10.0, "time": 0.4}, 1e-3, 4),  # 22.5 / s at first
+        ({"ratio": 10.0, "time": 0.4}, 5e-3, 1),
+        ({"ratio": 32.0, "time": 5.3}, 5e-3, 3),
+        ({"ratio": 1.1, "time": 100.0}, 1e-3, 100),
+        ({"kind": "spawn", "ratio": 8.0}, 1e-3, 1),
+        ({"ratio": 10.0, "time": 0.4, "split": False}, 1e-3, None),
+    ],
+)
+def test_births_wait_until_matter_has_grown_by_a_tenth(model, tick, every):
+    grown, _ = growing(model, side=2, tick=tick)
+    due = [t for t in range(201) if grown.due(t)]
+    assert due == ([] if every is None else list(range(0, 201, every)))
 
 
 @pytest.mark.parametrize("stretched", [0, 1, 2])
