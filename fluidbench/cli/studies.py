@@ -278,5 +278,5 @@ def table2(
         return
     sizes = [None if part == "fit" else count_of(part, "--pools") for part in names_in(pools, "--pools", "pool")]
     towers = None if variants is None else names_in(variants, "--variants", "variant")
-    more = placed(options, "table2") | {"pools": sizes, "variants": towers}
-    finish(study(methods_in(solvers), repeats=repeats_of(repeats), quick=quick, **more))
+    more = placed(options, "table2")
+    finish(study(methods_in(solvers), pools=sizes, variants=towers, repeats=repeats_of(repeats), quick=quick, **more))

@@ -155,7 +155,9 @@ class Section:
         """What the outer contour encloses; holes finer than the field's resolution are noise."""
         from scipy.ndimage import label
 
-        parts, _ = label(np.pad(self.fill < HALF, 1, constant_values=True))
+        empty = np.pad(self.fill < HALF, 1, constant_values=True)
+        parts = np.zeros(empty.shape, np.int32)
+        label(empty, output=parts)
         return parts[1:-1, 1:-1] != parts[0, 0]
 
     @property
