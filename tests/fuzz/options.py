@@ -38,6 +38,7 @@ HAS = {
     "--axis": ("stability",),
     "--levels": ("validate",),
     "--pools": ("table2",),
+    "--variants": ("table2",),
     "--backend": STUDIES,
     "--device": STUDIES,
     "--threads": STUDIES,
@@ -113,6 +114,7 @@ LISTS = {
     "--from": ("missing", "", ".", "/dev/null", "file", "x" * 5000, "a\x00b", "\udcff", "名前"),
     "--axis": (",", " ,, ", "density,density", "viscocity", "density;spacing", "x" * 5000, "nan", "Density"),
     "--levels": (",", "", " ", "coarse,coarse", "corse", "coarse;fine", "1.5", "nan", "x" * 5000),
+    "--variants": (",", "", " ", "plain,plain", "plian", "plain;curing", "nan", "Plain", "1", "x" * 5000),
     "--pools": (
         ",",
         "",
@@ -552,6 +554,7 @@ def legitimate(rng: random.Random) -> Iterator[Case]:
     right += [command("validate", "--levels", v) for v in ("rough,coarse", "fine")]
     right += [command("stability", "--axis", v, "--quick") for v in ("density", "viscosity,spacing")]
     right += [command("table2", "--pools", v) for v in ("fit", "298000", "298000,fit")]
+    right += [command("table2", "--variants", v) for v in ("plain", "curing, plain", "expansion + curing")]
     right += [command("compare", "--repeats", "3"), command("run", "--frames", "--render-every", "0.1")]
     right += [command("validate", "elliptic_drop", "--jobs", "1"), command("table1"), ("list",), ("doctor",)]
     right += [command("compare", "--backend", "warp"), command("run", "--spacing", "2e-3", "--out", "deep/er")]
