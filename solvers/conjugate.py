@@ -21,14 +21,17 @@ class Iterations:
         kernels: SimpleNamespace,
         tolerance: float,
         begin: wp.array,
+        past: wp.array,
         partial: wp.array,
     ) -> None:
         """`tolerance` is of the residual over what is solved for [-]; a world's sums are those of partial[begin[world]]
-        and so on, to begin[world + 1]."""
-        self.backend, self.kernels, self.begin, self.partial = backend, kernels, begin, partial
+        and so on, before past[world]."""
+        self.backend, self.kernels = backend, kernels
+        self.sums = [begin, past]
+        self.partial = partial
         self.ending = Ending()
         self.ending.tolerance, self.ending.most = tolerance, MOST
-        worlds = self.worlds = len(begin) - 1
+        worlds = self.worlds = len(past)
         self.team = 1 if wp.get_device(begin.device).is_cpu else TEAM
         with wp.ScopedDevice(begin.device):
             self.totals, self.going = wp.zeros(worlds, dtype=Totals), wp.zeros(1, dtype=int)
@@ -53,7 +56,7 @@ class Iterations:
         self._weigh("weigh_turn")
 
     def _weigh(self, name: str) -> None:
-        inputs = [self.ending, self.begin, self.team, self.partial]
+        inputs = [self.ending, *self.sums, self.team, self.partial]
         self.backend.launch(getattr(self.kernels, name), self.worlds * self.team, inputs, [self.totals, self.going])
 
     def effort(self, world: int = 0) -> dict[str, float]:

@@ -23,9 +23,12 @@ def residual_of(
     residual: Vectors,
     rows: Quads,
     partial: Twos,
+    past: Ints,
 ):
     for chunk in range(partial.shape[0]):
         world, sums = chunk * CHUNK // capacity, vec2(0.0)
+        if chunk * CHUNK == world * capacity:
+            past[world] = chunk + (count[world] + CHUNK - 1) // CHUNK
         for lane in range(CHUNK):
             i = chunk * CHUNK + lane
             if i - world * capacity < count[world]:
@@ -105,9 +108,9 @@ def unsolved(end: ti.template(), left, right):
 
 
 @ti.kernel
-def weigh_start(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Table, going: Ints):
+def weigh_start(end: EndingT, begin: Ints, past: Ints, team: int, partial: Twos, totals: Table, going: Ints):
     for world in range(totals.shape[0]):
-        sums = summed(partial, begin[world], begin[world + 1])
+        sums = summed(partial, begin[world], past[world])
         for k in ti.static(range(5)):
             totals[world, k] = 0.0
         totals[world, LEFT], totals[world, RIGHT] = sums[0], sums[1]
@@ -116,9 +119,9 @@ def weigh_start(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Tab
 
 
 @ti.kernel
-def weigh_step(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Table, going: Ints):
+def weigh_step(end: EndingT, begin: Ints, past: Ints, team: int, partial: Twos, totals: Table, going: Ints):
     for world in range(totals.shape[0]):
-        sums = summed(partial, begin[world], begin[world + 1])
+        sums = summed(partial, begin[world], past[world])
         totals[world, STEP] = 0.0
         if unsolved(end, totals[world, LEFT], totals[world, RIGHT]):
             totals[world, ITERATIONS] += 1.0
@@ -128,9 +131,9 @@ def weigh_step(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Tabl
 
 
 @ti.kernel
-def weigh_turn(end: EndingT, begin: Ints, team: int, partial: Twos, totals: Table, going: Ints):
+def weigh_turn(end: EndingT, begin: Ints, past: Ints, team: int, partial: Twos, totals: Table, going: Ints):
     for world in range(totals.shape[0]):
-        sums = summed(partial, begin[world], begin[world + 1])
+        sums = summed(partial, begin[world], past[world])
         totals[world, TURN] = 0.0
         if totals[world, STEP] != 0.0 or no_number(totals[world, STEP]):
             totals[world, TURN] = sums[0] / totals[world, LEFT]

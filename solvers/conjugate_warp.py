@@ -14,6 +14,7 @@ wp.set_module_options({"enable_backward": False})  # no fast math: what is no nu
 
 CHUNK = wp.constant(8)  # particles whose sums one thread adds up: results are the same on any number of threads
 TEAM = 32  # threads of a GPU that add up a world's chunks
+AHEAD = wp.constant(8)  # sums that each of them asks for at once: one by one it would wait for memory every time
 
 
 @wp.struct
@@ -48,11 +49,14 @@ def residual_of(
     residual: wp.array(dtype=wp.vec3),
     rows: wp.array(dtype=wp.vec4),
     partial: wp.array(dtype=wp.vec2),
+    past: wp.array(dtype=int),
 ):
-    """r = v* - K v, the first direction; sums of m r.r and of m v*.v*."""
+    """r = v* - K v, the first direction; sums of m r.r and of m v*.v*; where each world's chunks in use end."""
     chunk = index_of(share, wp.tid())
     first = chunk * CHUNK
     world = first / capacity
+    if first == world * capacity:
+        past[world] = chunk + (count[world] + CHUNK - 1) / CHUNK
     left, right = float(0.0), float(0.0)
     for lane in range(CHUNK):
         i = first + lane
@@ -147,10 +151,15 @@ def turn(
 def summed(partial: wp.array(dtype=wp.vec2), first: int, end: int, member: int, team: int):
     """The sum over a world's chunks, in double precision until threads join theirs."""
     left, right = wp.float64(0.0), wp.float64(0.0)
-    for k in range(first + member, end, team):
-        value = partial[k]
-        left += wp.float64(value[0])
-        right += wp.float64(value[1])
+    k = first + member
+    while k < end:
+        for lane in range(AHEAD):
+            at = k + lane * team
+            if at < end:
+                value = partial[at]
+                left += wp.float64(value[0])
+                right += wp.float64(value[1])
+        k += AHEAD * team
     return wp.vec2(joined(float(left), team), joined(float(right), team))
 
 
@@ -164,6 +173,7 @@ def unsolved(end: Ending, left: float, right: float):
 def weigh_start(
     end: Ending,
     begin: wp.array(dtype=int),
+    past: wp.array(dtype=int),
     team: int,
     partial: wp.array(dtype=wp.vec2),
     # outputs
@@ -173,7 +183,7 @@ def weigh_start(
     """m r.r and m v*.v*, and whether there is anything to solve. `going` was 0."""
     thread = wp.tid()
     world = thread / team
-    found = summed(partial, begin[world], begin[world + 1], thread - world * team, team)
+    found = summed(partial, begin[world], past[world], thread - world * team, team)
     if thread == world * team:
         total = Totals()
         total.left = found[0]
@@ -187,6 +197,7 @@ def weigh_start(
 def weigh_step(
     end: Ending,
     begin: wp.array(dtype=int),
+    past: wp.array(dtype=int),
     team: int,
     partial: wp.array(dtype=wp.vec2),
     # outputs
@@ -196,7 +207,7 @@ def weigh_step(
     """alpha = m r.r / m p.Kp; none where a world is done."""
     thread = wp.tid()
     world = thread / team
-    found = summed(partial, begin[world], begin[world + 1], thread - world * team, team)
+    found = summed(partial, begin[world], past[world], thread - world * team, team)
     if thread == world * team:
         total = totals[world]
         total.step = 0.0
@@ -212,6 +223,7 @@ def weigh_step(
 def weigh_turn(
     end: Ending,
     begin: wp.array(dtype=int),
+    past: wp.array(dtype=int),
     team: int,
     partial: wp.array(dtype=wp.vec2),
     # outputs
@@ -221,7 +233,7 @@ def weigh_turn(
     """beta, and whether to go on."""
     thread = wp.tid()
     world = thread / team
-    found = summed(partial, begin[world], begin[world + 1], thread - world * team, team)
+    found = summed(partial, begin[world], past[world], thread - world * team, team)
     if thread == world * team:
         total = totals[world]
         total.turn = 0.0

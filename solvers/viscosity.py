@@ -119,8 +119,9 @@ class ImplicitViscosity:
             self.rows = wp.zeros(pool.size * kernels.DIRECTION // 4, dtype=wp.vec4)
             self.aim, self.trial, self.image, self.residual = (wp.zeros(pool.size, dtype=wp.vec3) for _ in range(4))
             self.partial = wp.zeros(worlds * self.chunks, dtype=wp.vec2)
-            begin = wp.array([world * self.chunks for world in range(worlds + 1)], dtype=int)
-        self.iterations = Iterations(backend, self.kernels, tolerance, begin, self.partial)
+            begin = wp.array([world * self.chunks for world in range(worlds)], dtype=int)
+            self.past = wp.zeros(worlds, dtype=int)
+        self.iterations = Iterations(backend, self.kernels, tolerance, begin, self.past, self.partial)
         self.applying = kernels.Applying()
         self.applying.dt, self.applying.held, self.applying.image = scene.dt, pool.held, self.image
         self.applying.mass, self.applying.volume, self.applying.rows = pool.mass, pool.volume, self.rows
@@ -150,7 +151,7 @@ class ImplicitViscosity:
             self._particles("give_growth", [pool.growth], [self.rows])
             self._over_pairs("growing")
         inputs = [pool.held, pool.mass, self.aim, self.image]
-        self._particles("residual_of", inputs, [self.residual, self.rows, self.partial], self.chunks)
+        self._particles("residual_of", inputs, [self.residual, self.rows, self.partial, self.past], self.chunks)
         self.iterations.begin_with()
         self.iterations.repeat(self._iterate)
         ends = [scene.dt, pool.held, self.aim, self.trial, self.residual, int(impulse)]

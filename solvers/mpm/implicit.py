@@ -52,7 +52,8 @@ class GridViscosity:
             self.ranks = Ranks()
             self.ranks.number = wp.zeros(slots, dtype=int)
             self.ranks.many, self.ranks.begin = wp.zeros(self.worlds, dtype=int), wp.zeros(self.worlds + 1, dtype=int)
-        self.iterations = Iterations(solver.backend, self.kernels, tolerance, self.ranks.begin, self.partial)
+        begin = self.ranks.begin
+        self.iterations = Iterations(solver.backend, self.kernels, tolerance, begin, begin[1:], self.partial)
 
     def kernels_of(self, solver: SolverMPM) -> SimpleNamespace:
         if solver.backend.name == "taichi":
