@@ -55,6 +55,8 @@ class Deposit:
         from scipy.sparse import csr_array
 
         n, k, _ = points.shape
+        if not self.fill.size:
+            return np.zeros((n, len(up)))
         height = self.fill.shape[2]
         x, y = np.moveaxis((points - self.origin[:2]) / self.spacing, -1, 0)
         (i, wi), (j, wj), (z, wz) = map(_taps, (x, y, (up - self.origin[2]) / self.spacing), self.fill.shape)
@@ -155,7 +157,7 @@ class Section:
         """What the outer contour encloses; holes finer than the field's resolution are noise."""
         from scipy.ndimage import label
 
-        empty = np.pad(self.fill < HALF, 1, constant_values=True)
+        empty = np.pad(~(self.fill >= HALF), 1, constant_values=True)  # what is no number fills nothing
         parts = np.zeros(empty.shape, np.int32)
         label(empty, output=parts)
         return parts[1:-1, 1:-1] != parts[0, 0]

@@ -94,7 +94,7 @@ def final_lengths(frame: Frame, scenario: Scenario) -> dict[str, float]:
     if "bead_width_m" not in row:
         row |= beads(frame, deposit, scenario)
     free, path = is_out(frame, scenario), scenario.toolpath
-    if path is not None and path.kind == "ring" and path.center is not None and path.speed > 0:
+    if path is not None and path.kind == "ring" and path.center is not None and path.speed > 0 and free.any():
         center = np.average(frame["position"][free, :2], axis=0, weights=frame["mass"][free])
         row["ring_drift_m"] = float(np.hypot(*(center - path.center)))
     if is_tower(scenario):

@@ -219,10 +219,14 @@ class Simulation(Session):
 
     def _settle(self) -> None:
         """Let the solver make room for what was born."""
+        if self.aged == 0:
+            self.solver.refresh()  # the first time outside any graph
         if self._use_graphs:
             self.scene.crew.run("settle", self.solver.settle)
         else:
+            self._wait()
             self.solver.settle()
+            self._wait()
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""

@@ -29,7 +29,8 @@ def environment(gpu: str = "") -> dict[str, str]:
     products on one thread unless told (others spin for cores that are timed), and of the GPUs only the one named, if
     one is."""
     kept = {k: v for k, v in os.environ.items() if k not in NOISE} | {"PYTHONSAFEPATH": "1"}
-    kept = {"OPENBLAS_NUM_THREADS": "1"} | kept
+    if not {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"} & set(kept):
+        kept["OPENBLAS_NUM_THREADS"] = "1"
     return kept | ({"CUDA_VISIBLE_DEVICES": gpu} if gpu else {})
 
 

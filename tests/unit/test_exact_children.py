@@ -257,9 +257,12 @@ def test_children_find_our_code_before_the_users(monkeypatch, tmp_path):
     assert found == [standard, f"{standard}/lib-dynload", "/y/python311.zip", own, "/x/site-packages", str(tmp_path)]
     monkeypatch.setenv("PYTHONPATH", "/elsewhere")
     monkeypatch.setenv("KEPT", "1")
-    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
     seen = offspring.environment()
     assert seen["OPENBLAS_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    assert "OPENBLAS_NUM_THREADS" not in offspring.environment()
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
     assert offspring.environment()["OPENBLAS_NUM_THREADS"] == "3"
     assert "PYTHONPATH" not in seen and seen["PYTHONSAFEPATH"] == "1" and seen["KEPT"] == "1"

@@ -155,6 +155,14 @@ def test_planes_are_exact_for_polynomials_and_extend_outwards():
     assert full.plane(np.array([[[-5.0, 9.0]]]), np.array([0.0])) == pytest.approx(1.0, abs=1e-9)
 
 
+def test_what_is_no_number_fills_nothing_and_a_field_without_cells_is_empty():
+    fill = np.full((4, 4), 1.0)
+    fill[1] = np.nan
+    assert section(fill).solid.sum() == 12 and section(np.full((4, 4), np.nan)).width == 0.0
+    nothing = Deposit(np.zeros(3), 0.5, np.zeros((3, 4, 0)))
+    assert nothing.plane(np.zeros((2, 5, 2)), np.zeros(3)).tolist() == [[0.0] * 3] * 2
+
+
 def test_planes_are_what_scipy_makes_of_the_same_cells():
     """At places within and beyond the field, averaged over three points each."""
     rng = np.random.default_rng(4)

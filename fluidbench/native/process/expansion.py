@@ -148,9 +148,9 @@ class Growing:
         host must wait for it."""
         if not self.births:
             return False
-        pool, device = self.pool, self.scene.device
+        pool, launch = self.pool, self.scene.crew.launch
         self.born.zero_()
-        wp.launch(
+        launch(
             conceive,
             pool.size,
             [
@@ -166,7 +166,6 @@ class Growing:
                 pool.generation,
             ],
             [self.offspring_count, self.born, self.parent, self.number, self.splitting],
-            device=device,
         )
         *each, parents = self.born.numpy().tolist()
         if not parents:
@@ -178,15 +177,14 @@ class Growing:
         self.find_room(parents)
         self.old.assign(np.array(pool.counts, np.int32))
         if born.any():
-            wp.launch(
+            launch(
                 inherit,
                 (pool.worlds, int(born.max())),
                 [self.old, self.born, pool.capacity, pool.size, self.parent, pool.memory],
-                device=device,
             )
             for world in range(pool.worlds):
                 pool.set_count(world, pool.counts[world] + int(born[world]))
-        wp.launch(
+        launch(
             deliver,
             pool.size,
             [
@@ -202,7 +200,6 @@ class Growing:
                 self.halfway,
             ],
             [pool.position, pool.velocity, pool.mass, pool.volume, pool.origin, pool.generation],
-            device=device,
         )
         return True
 
@@ -210,15 +207,15 @@ class Growing:
         """Where the halves of what splits now will lie, of so many."""
         if self.room is None:
             return
-        pool, device, view = self.pool, self.scene.device, VIEW * self.scene.spacing
+        pool, launch, view = self.pool, self.scene.crew.launch, VIEW * self.scene.spacing
         family = [self.splitting, pool.origin, pool.generation, pool.volume]
-        crowding = wp.empty((parents, CANDIDATES), dtype=float, device=device)
+        crowding = wp.empty((parents, CANDIDATES), dtype=float, device=self.scene.device)
         for world, count in enumerate(pool.counts):
             position = pool.position[world * pool.capacity : world * pool.capacity + count]
             self.room.build(position, view)
             place = [self.room.id, self.chance, int(FIRST_DRAW), self.scene.box, view, world, pool.capacity]
-            wp.launch(crowd, crowding.shape, [*place, *family, position], [crowding], device=device)
-        wp.launch(take_room, parents, [self.chance, int(FIRST_DRAW), *family, crowding], [self.halfway], device=device)
+            launch(crowd, crowding.shape, [*place, *family, position], [crowding])
+        launch(take_room, parents, [self.chance, int(FIRST_DRAW), *family, crowding], [self.halfway])
 
     def footprint(self) -> dict[str, int]:
         names = ("offspring_count", "parent", "number", "born", "old", "halfway", "splitting") if self.births else ()
