@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import hypot
+from math import floor, hypot, log10
 from statistics import mean, stdev
 
 from ..errors import UserError, quoted, suggestion
@@ -177,11 +177,8 @@ def _word(holds: bool) -> str:
 
 
 def spread(values: Sequence[float]) -> str:
-    """Mean and standard deviation."""
+    """Mean and standard deviation, to four digits of the mean."""
     if not values:
         return "-"
-    return _figure(mean(values), 4) + (f" ± {_figure(stdev(values), 2)}" if len(values) > 1 else "")
-
-
-def _figure(value: float, digits: int) -> str:
-    return f"{value:,.0f}" if value >= 100 else f"{value:.{digits}g}"
+    places = max(0, 3 - floor(log10(max(abs(mean(values)), 1e-9))))
+    return " ± ".join(f"{figure:,.{places}f}" for figure in (mean(values), *([stdev(values)] if values[1:] else [])))

@@ -53,8 +53,8 @@ def _name(row: Row) -> str:
 def _timing(rows: Sequence[Row]) -> Table:
     """A row each: ours without and with pictures, and the paper's beside each."""
     several = len(_machines(rows)) > 1
-    head = ["", *(["machine"] if several else []), "method", "pool", "particles", "dt [ms]", "steps/s"]
-    table = Table("Table II", [*head, "s / sim. s", "paper", "with pictures", "paper"], note=NOTE)
+    head = ["", *(["machine"] if several else []), "method", "pool", "s / sim. s", "paper", "with pictures", "paper"]
+    table = Table("Table II", [*head, "particles", "dt [ms]", "steps/s"], note=NOTE)
     for row in rows:
         done = [r for r in row.bare if r.ok]
         cost = done[0].cost if done else None
@@ -63,7 +63,7 @@ def _timing(rows: Sequence[Row]) -> Table:
         size = ["-", "-"] if cost is None else [str(cost.peak_particles), f"{1e3 * cost.mean_dt_s:.3g}"]
         own = spread(row.speed()) if row.speed() else _verdicts(row)
         theirs = ("-", "-") if row.method != "mpm" else (_given(told.bare), _given(told.filmed))
-        table.rows.append([*begins, *size, own, spread(row.pace()), theirs[0], spread(row.pace(True)), theirs[1]])
+        table.rows.append([*begins, spread(row.pace()), theirs[0], spread(row.pace(True)), theirs[1], *size, own])
     return table
 
 

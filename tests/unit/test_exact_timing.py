@@ -159,8 +159,8 @@ def test_speeds_of_a_row_and_their_spread():
     made = row("plain", [90.0, 110.0], [40.0])
     assert made.speed() == [90.0, 110.0] and made.speed(True) == [40.0] and made.pace() == [0.9, 1.1]
     assert made.pace(filmed=True) == [0.4]
-    assert spread([23_310.2, 23_431.0]) == "23,371 ± 85" and spread([9312.0, 8700.0]) == "9,006 ± 433"
-    assert spread(made.speed()) == "100 ± 14" and spread([1.23456]) == "1.235" and spread([]) == "-"
+    assert spread([23_310.2, 23_431.0]) == "23,371 ± 85" and spread([0.0428, 0.0432]) == "0.04300 ± 0.00028"
+    assert spread(made.speed()) == "100.0 ± 14.1" and spread([1.23456]) == "1.235" and spread([]) == "-"
     lacks = Row("plain", None, "mpm", [finished(verdict="error")], [finished("sph", "timeout")])
     assert lacks.speed() == [] and len(lacks.missing()) == 2
 
@@ -181,13 +181,13 @@ def test_the_papers_figures_stand_beside_ours():
         "curing",
         "mpm",
         "as needed",
+        "1.000 ± 0.141",
+        "12.6 ± 0.2",
+        "0.4000",
+        "34.2 ± 0.3",
         "10",
         "0.1",
-        "100 ± 14",
-        "1 ± 0.14",
-        "12.6 ± 0.2",
-        "0.4",
-        "34.2 ± 0.3",
+        "100.0 ± 14.1",
     ]
 
 
