@@ -61,9 +61,10 @@ def _timing(rows: Sequence[Row]) -> Table:
         told = printed(row.variant, row.pool)
         begins = [row.variant, *([row.machine] if several else []), row.method, str(row.pool or "as needed")]
         size = ["-", "-"] if cost is None else [str(cost.peak_particles), f"{1e3 * cost.mean_dt_s:.3g}"]
-        own = spread(row.speed()) if row.speed() else _verdicts(row)
+        own = spread(row.pace()) if row.pace() else _verdicts(row)
         theirs = ("-", "-") if row.method != "mpm" else (_given(told.bare), _given(told.filmed))
-        table.rows.append([*begins, spread(row.pace()), theirs[0], spread(row.pace(True)), theirs[1], *size, own])
+        figures = [own, theirs[0], spread(row.pace(True)), theirs[1]]
+        table.rows.append([*begins, *figures, *size, spread(row.speed())])
     return table
 
 
