@@ -16,14 +16,34 @@ def least_eigenvalue(m):
 
 @ti.func
 def symmetric_inverse(m):
-    """Inverse of a moment matrix, faded into the identity as 4 det / trace^2, a bound on its least eigenvalue, falls
-    from SOUND to SINGULAR."""
-    inverse = ti.Matrix.identity(ti.f32, 3)
-    least = least_eigenvalue(m)
-    if least > SINGULAR:
-        share = ti.min((least - SINGULAR) / (SOUND - SINGULAR), 1.0)
-        inverse = share * m.inverse() + (1.0 - share) * inverse
-    return inverse
+    """Inverse of a moment matrix, held back along what no neighbour spans as 4 det / trace^2, a bound on its least
+    eigenvalue, falls from SOUND to SINGULAR."""
+    share = ti.math.clamp((SOUND - least_eigenvalue(m)) / (SOUND - SINGULAR), 0.0, 1.0)
+    return m @ (m @ m + share * SOUND * SOUND * ti.Matrix.identity(ti.f32, 3)).inverse()
+
+
+@ti.func
+def spanned(m, inverse):
+    """The share of each direction that neighbours span."""
+    share = ti.Matrix.identity(ti.f32, 3)
+    if least_eigenvalue(m) < SOUND:
+        share = m @ inverse
+    return share
+
+
+@ti.func
+def strain_by_chords(span, gradient, h):
+    """Rate of logarithmic strain [1/s] of the step that ends here, along the chords by which particles came."""
+    along = span @ gradient
+    strain = 0.5 * (along + along.transpose() - h * gradient.transpose() @ gradient)
+    return strain + h * strain @ strain
+
+
+@ti.func
+def from_before(strain, along, h):
+    """Velocity gradient over where matter was a step ago [1/s]."""
+    spin = 0.5 * (along - along.transpose())
+    return strain + spin + h * (strain @ spin + 0.5 * (strain @ strain + spin @ spin))
 
 
 @ti.func

@@ -236,7 +236,9 @@ def passes(alone: bool) -> SimpleNamespace:
                     a = inertia * near_walls(grid, position[p], c)
                 j, b, s = volume_ratio[p], elastic_normal[p], elastic_shear[p]
                 if held[p] != CARRIED and h > 0.0:
-                    j *= ti.max(1.0 + h * c.trace(), 0.1)
+                    t = c.trace()
+                    minors = 0.5 * (t * t - (c @ c).trace())
+                    j *= ti.max(1.0 + h * (t + h * (minors + h * c.determinant())), 0.1)
                     if phase.shear_modulus > 0.0:
                         b, s, _ = strained(phase, phase.shear_modulus, c, b, s, h, p, plastic)
                         elastic_normal[p], elastic_shear[p] = b, s

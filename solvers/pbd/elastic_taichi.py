@@ -3,7 +3,14 @@ anew from the same equations."""
 
 from fluidbench.method.frame import CARRIED, FREE
 
-from ..corrected_taichi import elastic_stress, mirrored_stress, symmetric_inverse
+from ..corrected_taichi import (
+    elastic_stress,
+    from_before,
+    mirrored_stress,
+    spanned,
+    strain_by_chords,
+    symmetric_inverse,
+)
 from ..flow_taichi import pressure, strained
 from ..neighbours_taichi import BoxT, ListsT, image_velocity
 from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, symmetric_at, vector_at, vector_into, writer
@@ -101,9 +108,11 @@ def strain(
             carried = mat3(0.0)
             if phase.shear_modulus > 0.0:
                 sums = strained_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
-                correction = symmetric_inverse(symmetric_at(sums, 9))
+                moment = symmetric_at(sums, 9)
+                correction = symmetric_inverse(moment)
+                span = spanned(moment, correction)
                 slope = stressed(sums, 0) @ correction
-                slope += dt[world] * slope @ slope
+                slope = from_before(strain_by_chords(span, slope, dt[world]), span @ slope, dt[world])
                 b, s, share, ratio, push = elastic_normal[i], elastic_shear[i], kept[i], volume_ratio[i], 0.0
                 if held[i] != CARRIED:
                     b, s, share = strained(phase, phase.shear_modulus, slope, b, s, dt[world], i, plastic)
@@ -113,7 +122,7 @@ def strain(
                         volume_ratio[i] = ratio
                 if is_solid(phase):
                     push = pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-                carried = elastic_stress(share * phase.shear_modulus, b, s, push) @ correction
+                carried = span @ elastic_stress(share * phase.shear_modulus, b, s, push) @ correction
             row = ti.Vector.zero(ti.f32, PULLING)
             for c in ti.static(range(4)):
                 row[c] = own[c]

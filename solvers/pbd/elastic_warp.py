@@ -20,7 +20,7 @@ from fluidbench.native.vector_access import store_vec4
 
 from ..aging import rest_density
 from ..bind import warp_func
-from ..corrected import elastic_stress, mirrored_stress, symmetric_inverse
+from ..corrected import elastic_stress, from_before, mirrored_stress, spanned, strain_by_chords, symmetric_inverse
 from ..flow import pressure, strained
 from ..images import image_velocity
 from ..pairs import Pass, floats
@@ -114,8 +114,8 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
             sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]
         )  # fmt: skip
         slope = slope * correction
-        # As seen from where the substep began: (1 - h l)^-1 = 1 + h (l + h l^2) + ..., a rotation where v is its chord.
-        slope += h * slope * slope
+        span = spanned(moment, correction)
+        slope = from_before(strain_by_chords(span, slope, h), span * slope, h)
         b = data.elastic_normal[i]
         s = data.elastic_shear[i]
         ratio = data.volume_ratio[i]
@@ -130,7 +130,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
                 data.volume_ratio[i] = ratio
         if is_solid(phase):
             push = pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-        stress = elastic_stress(data.kept[i] * phase.shear_modulus, b, s, push) * correction
+        stress = span * elastic_stress(data.kept[i] * phase.shear_modulus, b, s, push) * correction
     store_vec4(data.pulling, 4 * i, wp.vec4(own[0], own[1], own[2], own[3]))
     store_vec4(data.pulling, 4 * i + 1, wp.vec4(stress[0, 0], stress[0, 1], stress[0, 2], stress[1, 0]))
     store_vec4(data.pulling, 4 * i + 2, wp.vec4(stress[1, 1], stress[1, 2], stress[2, 0], stress[2, 1]))

@@ -10,7 +10,15 @@ from fluidbench.native.scene import PERIODIC
 
 from ..aging import DISORDER
 from ..corrected import SOUND
-from ..corrected_taichi import elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
+from ..corrected_taichi import (
+    elastic_stress,
+    from_before,
+    least_eigenvalue,
+    mirrored_stress,
+    spanned,
+    strain_by_chords,
+    symmetric_inverse,
+)
 from ..flow_taichi import pressure, shear_rate, strained
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_traction, image_velocity
@@ -234,14 +242,17 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
                 second, approach, sheared, flows, h = 0.0, 0.0, 0.0, True, dt[world]
-                gradient, correction = mat3(0.0), ti.Matrix.identity(ti.f32, 3)
+                gradient, correction, span = mat3(0.0), mat3(0.0), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
                 if ti.static(strength):
                     moment = symmetric_at(sums, 16)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
                     gradient = stressed(sums, 7) @ correction / rho
-                    approach = -rho * gradient.trace()
+                    span = spanned(moment / rho, correction)
+                    deformation = strain_by_chords(span, gradient, h)
+                    gradient = span @ gradient
+                    approach = -rho * deformation.trace()
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
                     off = (vector_at(sums, 22) - gradient @ first_moment) / rho
                     if least_eigenvalue(moment / rho) < SOUND:
@@ -250,9 +261,11 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                             approach -= rho * growth[i]
                     if held[i] != CARRIED:
                         kept = 1.0
-                        b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h, i, plastic)
+                        turned = from_before(deformation, gradient, h)
+                        b, s, kept = strained(phase, phase.shear_modulus, turned, b, s, h, i, plastic)
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
-                        z = kept * (z + h * (0.5 * (gradient - gradient.transpose()) @ z + off))
+                        spin = 0.5 * (gradient - gradient.transpose())
+                        z = kept * (z + h * (spin @ (z + 0.5 * h * spin @ z) + off))
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
                     sheared = shear_rate(gradient)
                 else:
@@ -284,7 +297,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     pull = num.compact * (num.hourglass * phase.shear_modulus * z + damping * off)
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     cauchy -= pull.outer_product(first_moment / own[7])
-                    row = matrix_into(row, 7, scale * (cauchy @ correction))
+                    row = matrix_into(row, 7, scale * (span @ cauchy @ correction))
                     row = vector_into(row, 16, scale * pull)
                 else:
                     row[7] = scale * p

@@ -18,7 +18,16 @@ from fluidbench.native.vector_access import store_vec4
 
 from ..aging import rest_density
 from ..bind import warp_func
-from ..corrected import SOUND, elastic_stress, least_eigenvalue, mirrored_stress, symmetric_inverse
+from ..corrected import (
+    SOUND,
+    elastic_stress,
+    from_before,
+    least_eigenvalue,
+    mirrored_stress,
+    spanned,
+    strain_by_chords,
+    symmetric_inverse,
+)
 from ..flow import pressure, shear_rate, strained
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
@@ -203,7 +212,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         crowd = wp.vec3(sums[4], sums[5], sums[6])
         second, inflow, strain = float(0.0), float(0.0), float(0.0)
         flows = bool(True)
-        gradient, correction = wp.mat33(), wp.mat33()
+        gradient, correction, span = wp.mat33(), wp.mat33(), wp.mat33()
         if wp.static(strength):
             # density from the corrected gradient, too: the same strain for pressure and for shear
             moment = wp.mat33(
@@ -215,7 +224,10 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
                 sums[7], sums[8], sums[9], sums[10], sums[11], sums[12], sums[13], sums[14], sums[15]
             )  # fmt: skip
             gradient = gradient * correction / rho
-            inflow = -rho * wp.trace(gradient)
+            span = spanned(moment / rho, correction)
+            deformation = strain_by_chords(span, gradient, h)
+            gradient = span * gradient
+            inflow = -rho * wp.trace(deformation)
             b = data.elastic_normal[i]
             s = data.elastic_shear[i]
             # the gradient of a straggler is not exact even in a linear flow
@@ -225,7 +237,8 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             z = whole * data.off_linear[i]
             q = (whole / rho) * (wp.vec3(sums[22], sums[23], sums[24]) - gradient * first_moment)
             if data.held[i] != CARRIED:
-                b, s, kept = strained(phase, phase.shear_modulus, gradient, b, s, h, i, data.plastic)
+                turned = from_before(deformation, gradient, h)
+                b, s, kept = strained(phase, phase.shear_modulus, turned, b, s, h, i, data.plastic)
                 flows = kept < 1.0 or phase.shear_modulus <= 0.0
                 z = off_linear(z, gradient, q, kept, h)
                 data.elastic_normal[i] = b
@@ -263,7 +276,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             damping = 0.1 * num.artificial_viscosity * num.h * sound * rho * num.compact
             pull = pulled_back(phase, num.hourglass * num.compact, damping, z, q)
             # With the correction of its gradient stress does on the particles exactly the work of the strain.
-            t = scale * ((elastic_stress(g, b, s, p) - wp.outer(pull, first_moment / own[7])) * correction)
+            t = scale * (span * (elastic_stress(g, b, s, p) - wp.outer(pull, first_moment / own[7])) * correction)
             pull *= scale
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], t[0, 0]))
             store_vec4(data.state, at + 2, wp.vec4(t[0, 1], t[0, 2], t[1, 0], t[1, 1]))

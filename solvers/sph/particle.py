@@ -41,9 +41,10 @@ class Smoothing:
 
 @wp.func
 def off_linear(z: wp.vec3, gradient: wp.mat33, q: wp.vec3, kept: float, dt: float):
-    """z [1/m] after a step dt [s] in which the share `kept` of the deviator was kept."""
+    """z [1/m] after a step dt [s] in which the share `kept` of the deviator was kept. It turns to second order: to
+    first it would grow by (dt w)^2 / 2 a step."""
     spin = 0.5 * (gradient - wp.transpose(gradient))
-    return kept * (z + dt * (spin * z + q))
+    return kept * (z + dt * (spin * (z + (0.5 * dt) * (spin * z)) + q))
 
 
 @wp.func

@@ -7,8 +7,8 @@ import pytest
 import warp as wp
 
 from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Box
-from solvers import corrected, neighbours
-from solvers.corrected import least_eigenvalue, mirrored_stress, symmetric_inverse
+from solvers import neighbours
+from solvers.corrected import mirrored_stress
 from solvers.images import (
     contained,
     face_kind,
@@ -69,18 +69,6 @@ def look(
     numbers[i, 7] = int(has_choice(near, c))
 
 
-@wp.kernel
-def invert(
-    m: wp.array(dtype=wp.mat33),
-    # outputs
-    inverse: wp.array(dtype=wp.mat33),
-    least: wp.array(dtype=float),
-):
-    i = wp.tid()
-    inverse[i] = symmetric_inverse(m[i])
-    least[i] = least_eigenvalue(m[i])
-
-
 X, GRADIENT = np.array([0.25, 0.5, 3.0]), np.arange(1.0, 10.0).reshape(3, 3)
 
 
@@ -94,15 +82,6 @@ def seen(b, *codes, near=(7, 7, 7)):
         [b, wp.vec3(*X), wp.vec3(*V), wp.mat33(*GRADIENT.ravel()), wp.vec3i(*near), wp.array(codes, dtype=int)],
         out,
     )
-    return [array.numpy() for array in out]
-
-
-def inverted(*matrices):
-    """(inverse, least eigenvalue) of each matrix."""
-    n = len(matrices)
-    out = [wp.zeros(n, dtype=wp.mat33), wp.zeros(n, dtype=float)]
-    given = wp.array(np.array(matrices, np.float32).reshape(n, 3, 3), dtype=wp.mat33)
-    wp.launch(invert, n, [given], out)
     return [array.numpy() for array in out]
 
 
@@ -199,27 +178,6 @@ def test_a_grid_of_cells_covers_the_domain_or_repeats_itself():
         4,
         4,
     ]
-
-
-def test_a_moment_is_inverted_where_it_is_sound_and_left_where_it_is_not():
-    """4 det / trace^2 of diag(1, 1, a): up to 0.08 gives the identity, from 0.12 on the inverse."""
-
-    def thin(least):
-        """diag(1, 1, a) with 4 a / (2 + a)^2 = least."""
-        return np.diag([1.0, 1.0, (2 - 2 * least - 2 * math.sqrt(1 - 2 * least)) / least])
-
-    full = np.array([[0.5, 0.1, 0.0], [0.1, 0.75, 0.2], [0.0, 0.2, 1.0]])
-    inverse, least = inverted(full, thin(0.1), thin(0.079), thin(0.121))
-    assert least == pytest.approx([4 * np.linalg.det(full) / 2.25**2, 0.1, 0.079, 0.121], rel=1e-4)
-    assert inverse[0] == pytest.approx(np.linalg.inv(full), rel=1e-5)
-    assert inverse[1] == pytest.approx(0.5 * np.linalg.inv(thin(0.1)) + 0.5 * np.eye(3), rel=1e-3)
-    assert inverse[2] == pytest.approx(np.eye(3)) and inverse[3] == pytest.approx(np.linalg.inv(thin(0.121)), rel=1e-4)
-
-
-def test_stress_of_an_elastic_tensor_by_hand():
-    """G dev b - p, with G = 2, b = (1, 2, 6), its mean 3."""
-    got = np.array(corrected.elastic_stress(2.0, wp.vec3(1.0, 2.0, 6.0), wp.vec3(0.5, 0.25, 0.125), 10.0)).reshape(3, 3)
-    assert got == pytest.approx(np.array([[-14.0, 1.0, 0.5], [1.0, -12.0, 0.25], [0.5, 0.25, -4.0]]))
 
 
 # --- rubbing of PBD
