@@ -9,7 +9,7 @@ from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC
 
 from ..aging import DISORDER
-from ..corrected import SOUND
+from ..corrected import EDGE, SOUND
 from ..corrected_taichi import (
     elastic_stress,
     from_before,
@@ -241,7 +241,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     sound *= ti.sqrt(phase.density / rest)
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
-                second, approach, sheared, flows, h = 0.0, 0.0, 0.0, True, dt[world]
+                second, approach, sheared, alone, flows, h = 0.0, 0.0, 0.0, 0.0, True, dt[world]
                 gradient, correction, span = mat3(0.0), mat3(0.0), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
                 if ti.static(strength):
@@ -255,7 +255,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     approach = -rho * deformation.trace()
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
                     off = (vector_at(sums, 22) - gradient @ first_moment) / rho
-                    if least_eigenvalue(moment / rho) < SOUND:
+                    least = least_eigenvalue(moment / rho)
+                    alone = ti.math.clamp((EDGE - least) / (EDGE - SOUND), 0.0, 1.0)
+                    if least < SOUND:
                         off, z = vec3(0.0), vec3(0.0)
                         if ti.static(changing):
                             approach -= rho * growth[i]
@@ -299,6 +301,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     cauchy -= pull.outer_product(first_moment / own[7])
                     row = matrix_into(row, 7, scale * (span @ cauchy @ correction))
                     row = vector_into(row, 16, scale * pull)
+                    row[19] = alone
                 else:
                     row[7] = scale * p
                 if ti.static(changing):
@@ -333,6 +336,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         if ti.static(strength):
             push = (mine * stressed(own, 7) + theirs * stressed(other, 7)) @ r
             push += theirs * vector_at(other, 16) - mine * vector_at(own, 16)
+            along = ti.max(own[19], other[19]) * shock * ur / (r2 + tiny)
         else:
             pressures = mine * own[7] + theirs * other[7]
             along = shock * ti.min(ur, 0.0) / (r2 + tiny) - pressures
@@ -366,7 +370,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 phase = phase_at(phases, world, phase_of[i])
                 own = state_at(state, i)
                 # Pi_ij per velocity difference: alpha h c / rho (Monaghan 1992), and 2 (d + 2) mu / (rho_i rho_j)
-                shock = num.artificial_viscosity * num.h * phase.wave_speed / density[i]
+                shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
                 drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
                 begun = vec4(shock, drag, 0.0, 0.0)
                 sums = pushed_by(num, box, lists, entries, number, state, density, i, own, begun)

@@ -33,7 +33,7 @@ from ..images import WALL_INSET, contained, image_gradient, image_traction, imag
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
 from ..tool import Tool, felt, keep_out, seen_by_tool
-from .particle import Smoothing, broken, drifted, off_linear, out_of_crowd, pulled_back
+from .particle import Smoothing, broken, drifted, off_linear, out_of_crowd, pulled_back, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -45,8 +45,9 @@ CRUSHED = wp.constant(1.0e3)  # density over that at rest that no matter reaches
 
 # Rows of `strain`: position, mass | velocity, density | carried gradient, rest density.
 MATTER = 12
-# Rows of `force`: position, mass | velocity, then of liquids the pressure term; of what has strength stress (9) and the
-# traction that pulls back (3). Where partners differ also density, rest density, viscosity, sound.
+# Rows of `force`: position, mass | velocity, then of liquids the pressure term; of what has strength stress (9), the
+# traction that pulls back (3) and how far it is a straggler. Where partners differ also density, rest density,
+# viscosity, sound.
 STATE = {(False, False): 8, (True, False): 20, (False, True): 12, (True, True): 24}
 
 
@@ -210,7 +211,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         spread = sums[0]
         first_moment = wp.vec3(sums[1], sums[2], sums[3])
         crowd = wp.vec3(sums[4], sums[5], sums[6])
-        second, inflow, strain = float(0.0), float(0.0), float(0.0)
+        second, inflow, strain, alone = float(0.0), float(0.0), float(0.0), float(0.0)
         flows = bool(True)
         gradient, correction, span = wp.mat33(), wp.mat33(), wp.mat33()
         if wp.static(strength):
@@ -231,7 +232,9 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             b = data.elastic_normal[i]
             s = data.elastic_shear[i]
             # the gradient of a straggler is not exact even in a linear flow
-            whole = float(least_eigenvalue(moment / rho) >= SOUND)
+            least = least_eigenvalue(moment / rho)
+            whole = float(least >= SOUND)
+            alone = straggling(least)
             if wp.static(changing):
                 inflow -= (1.0 - whole) * rho * data.growth[i]  # nothing is there that it would have to push away
             z = whole * data.off_linear[i]
@@ -281,7 +284,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], t[0, 0]))
             store_vec4(data.state, at + 2, wp.vec4(t[0, 1], t[0, 2], t[1, 0], t[1, 1]))
             store_vec4(data.state, at + 3, wp.vec4(t[1, 2], t[2, 0], t[2, 1], t[2, 2]))
-            store_vec4(data.state, at + 4, wp.vec4(pull[0], pull[1], pull[2], 0.0))
+            store_vec4(data.state, at + 4, wp.vec4(pull[0], pull[1], pull[2], alone))
         else:
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], scale * p))
         if wp.static(changing):
@@ -301,9 +304,9 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
     def begin(num: Smoothing, data: Forcing, world: int, i: int):
         """Coefficients of artificial and of Newtonian viscosity, where they do not depend on the partner."""
         phase = data.phases[world, data.phase_of[i]]
-        shock = num.artificial_viscosity * num.h * phase.wave_speed / data.new_density[i]
-        # Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j), at rest density: a cavitated liquid, whose density is
-        # low, would break the bound on dt
+        # At rest density: both partners must find the same force, and a cavitated liquid, whose density is low, would
+        # break the bound on dt. Monaghan 1992: alpha h c / rho; Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
+        shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
         drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
         return wp.vec4(shock, drag, 0.0, 0.0)
 
@@ -360,6 +363,7 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
                 theirs * other[18] - mine * own[18],
             )
             push = both * r + pull
+            along = wp.max(own[19], other[19]) * shock * ur / (r2 + tiny)
         else:
             both_pressures = mine * own[7] + theirs * other[7]
             # artificial viscosity for approaching particles (Monaghan 1992)

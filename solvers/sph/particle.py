@@ -14,6 +14,7 @@ import warp as wp
 from fluidbench.native.scene import Phase
 
 from ..aging import DISORDER
+from ..corrected import EDGE, SOUND
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -51,6 +52,18 @@ def off_linear(z: wp.vec3, gradient: wp.mat33, q: wp.vec3, kept: float, dt: floa
 def pulled_back(phase: Phase, stiffness: float, damping: float, z: wp.vec3, q: wp.vec3):
     """g [Pa m]; `stiffness` is zeta l^2 [m^2], `damping` rho nu l^2 [Pa s m^2]."""
     return stiffness * phase.shear_modulus * z + damping * q
+
+
+@wp.func
+def straggling(least: float):
+    """How much of the customary artificial viscosity a particle of what has strength needs [-], by the least
+    eigenvalue of its moment: none within a lattice and on its edges.
+
+    Few particles see little of each other's motion, so that no stress resists the rest of it, and the images in no-slip
+    walls, which do not pull back by what they showed, feed it: where foam cured on a floor particles swung more and
+    more, and were thrown off at 3 m/s. Along the line of centres this slows nothing that rests, flies or turns.
+    """
+    return wp.clamp((EDGE - least) / (EDGE - SOUND), 0.0, 1.0)
 
 
 @wp.func
