@@ -296,7 +296,8 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     row[c] = own[c]
                 if ti.static(strength):
                     damping = 0.1 * num.artificial_viscosity * num.h * sound * rho
-                    pull = num.compact * (num.hourglass * phase.shear_modulus * z + damping * off)
+                    packing = ti.max(num.lattice * second / (3.0 * rho), 1.0)
+                    pull = num.compact / packing**2 * (num.hourglass * phase.shear_modulus * z + damping * off)
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     cauchy -= pull.outer_product(first_moment / own[7])
                     row = matrix_into(row, 7, scale * (span @ cauchy @ correction))

@@ -276,8 +276,12 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J
             # Monaghan & Gingold 1983 act as a viscosity alpha h c / 10: here on what no gradient shows, a smooth flow
             # feels none
-            damping = 0.1 * num.artificial_viscosity * num.h * sound * rho * num.compact
-            pull = pulled_back(phase, num.hourglass * num.compact, damping, z, q)
+            # Where particles are packed more densely than a lattice, by a factor that the second moment tells, q is
+            # larger by it for the same motion, and so is what g does: over its square damping keeps its bound on dt.
+            packing = wp.max(num.lattice * second / (3.0 * rho), 1.0)
+            compact = num.compact / (packing * packing)
+            damping = 0.1 * num.artificial_viscosity * num.h * sound * rho * compact
+            pull = pulled_back(phase, num.hourglass * compact, damping, z, q)
             # With the correction of its gradient stress does on the particles exactly the work of the strain.
             t = scale * (span * (elastic_stress(g, b, s, p) - wp.outer(pull, first_moment / own[7])) * correction)
             pull *= scale
