@@ -275,7 +275,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         if wp.static(strength):
             g = phase.shear_modulus * rho / rest  # Cauchy from Kirchhoff: divide by J
             # Monaghan & Gingold 1983 act as a viscosity alpha h c / 10: here on what no gradient shows, a smooth flow
-            # feels none
+            # feels none.
             # Where particles are packed more densely than a lattice, by a factor that the second moment tells, q is
             # larger by it for the same motion, and so is what g does: over its square damping keeps its bound on dt.
             packing = wp.max(num.lattice * second / (3.0 * rho), 1.0)
