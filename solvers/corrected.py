@@ -17,6 +17,7 @@ wp.set_module_options({"enable_backward": False})
 # Least eigenvalue of moments, as bounded by `least_eigenvalue`, between which the correction is held back. In a cubic
 # lattice (SPH at h = 1.3 to 1.5 d, PBD at H = 2.4 d) it is 0.44 inside, 0.28 on a face, 0.17 on an edge, 0.10 in a
 # corner. The correction multiplies stiffness by up to the inverse square: a straggler with 0.02 breaks any bound on dt.
+# Below that of an edge SPH's particles are stragglers.
 SINGULAR, SOUND, EDGE = wp.constant(0.08), wp.constant(0.12), wp.constant(0.17)
 
 
