@@ -126,6 +126,24 @@ def relieve(
 
 
 @wp.kernel
+def relieve_off_linear(
+    share: wp.vec3i,
+    capacity: int,
+    count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    due: wp.array(dtype=int),
+    phase_of: wp.array(dtype=int),
+    # outputs
+    off_linear: wp.array(dtype=wp.vec3),
+):
+    """Carry over what pulls back strain that no gradient shows, before the phase changes."""
+    i = index_of(share, wp.tid())
+    world = i / capacity
+    if i - world * capacity < count[world] and due[i] != phase_of[i]:
+        off_linear[i] = relief(phases[world, phase_of[i]], phases[world, due[i]]) * off_linear[i]
+
+
+@wp.kernel
 def harden(
     share: wp.vec3i,
     capacity: int,

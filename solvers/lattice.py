@@ -1,4 +1,4 @@
-"""What SPH's sums come to in a cubic lattice: constants that make them exact there, and its shortest waves."""
+"""What sums over partners come to in a cubic lattice: constants that make them exact there, and its shortest waves."""
 
 import math
 from functools import cache
@@ -10,10 +10,21 @@ from fluidbench.method.timestep import damped_limit
 from .smoothing import wendland_slope
 
 
-def lattice(ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 3) of a unit lattice about a particle and -W'/r there (n,), with h = ratio."""
-    axis = np.arange(-int(2 * ratio) - 1, int(2 * ratio) + 2)
-    places = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3).astype(float)
+def lattice(support: float) -> np.ndarray:
+    """Places (n, 3) of a unit lattice about one of them that may be within its support, itself included."""
+    axis = np.arange(-int(support) - 1, int(support) + 2)
+    return np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3).astype(float)
+
+
+def opposed(places: np.ndarray, weights: np.ndarray, axes: int = 1) -> float:
+    """Sum of weights over those places that move against the middle in the shortest wave along one axis, or along the
+    diagonal of several."""
+    return float(weights[places[:, :axes].sum(axis=1) % 2 == 1].sum())
+
+
+def sloping(ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places of a unit lattice and SPH's -W'/r there (n,), with h = ratio."""
+    places = lattice(2 * ratio)
     slopes = [-wendland_slope(float(np.linalg.norm(place)) / ratio, ratio) for place in places]
     return places, np.array(slopes)
 
@@ -22,7 +33,7 @@ def lattice(ratio: float) -> tuple[np.ndarray, np.ndarray]:
 def lattice_moments(ratio: float) -> tuple[float, float]:
     """Sums over a unit lattice with h = ratio, each 1 in the continuum: the second moment -sum V r^2 W' / (3 r), which
     scales summed density, and the fourth -5 sum V x^2 z^2 W' / r^3, which scales viscosity in shear."""
-    places, slopes = lattice(ratio)
+    places, slopes = sloping(ratio)
     r2 = (places**2).sum(axis=1)
     fourth = slopes * places[:, 0] ** 2 * places[:, 2] ** 2 / np.maximum(r2, 1.0)
     return float((slopes * r2).sum() / 3.0), float(5.0 * fourth.sum())
@@ -35,15 +46,13 @@ def viscous_scale(ratio: float) -> float:
 
 @cache
 def opposing(ratio: float, axes: int = 1) -> float:
-    """Sum of -V W' / r over the partners in a unit lattice that move against a particle in the shortest wave along one
-    axis, or along the diagonal of several.
+    """Sum of SPH's -V W' / r over the partners in a unit lattice that move against a particle: see `opposed`.
 
     A velocity v in that wave has q = 2 v opposing; with l = 1 / opposing (in spacings) g does the work that the stress
     between neighbours would do, G (2 v / d)^2 / 2 a volume, at zeta = 1, and at zeta = pi^2 / 4 the shortest wave is as
     fast as all others.
     """
-    places, slopes = lattice(ratio)
-    return float(slopes[places[:, :axes].sum(axis=1) % 2 == 1].sum())
+    return opposed(*sloping(ratio), axes)
 
 
 def hourglass_limit(ratio: float, zeta: float, shear_speed: float, alpha_c: float) -> float:

@@ -74,5 +74,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=HALF / 16,
-    exempt={"pbd": "the lattice breaks up in the sheared layer, sooner or later: 3, 8 and 11 % were measured at d"},
 )

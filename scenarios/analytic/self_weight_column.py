@@ -65,5 +65,4 @@ CASE = Case(
     fine_tolerance=0.005,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "3 % too stiff at d and at d / 2; cause not known"},
 )

@@ -49,7 +49,4 @@ CASE = Case(
     tolerance=0.05,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={
-        "pbd": "the thin foot splits into petals: 0.13 at H / 32, 0.08 at H / 48",
-    },
 )

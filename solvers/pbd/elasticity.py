@@ -21,6 +21,7 @@ class Elasticity:
         data.volume_ratio = pool.add_field("volume_ratio", float, 1.0, within=within)
         data.elastic_normal = pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=within)
         data.elastic_shear = pool.add_field("elastic_shear", wp.vec3)
+        data.off_linear = pool.add_field("off_linear", wp.vec3)
         data.plastic = plastic_strains(scene, pool)
         data.kept, data.pulled = self.kept, pool.add_field("pulled", wp.vec3)
         with wp.ScopedDevice(scene.device):

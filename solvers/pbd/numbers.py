@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import warp as wp
 
-from ..smoothing import cusp, cusp_slope, spiky, spiky_slope
+from ..lattice import lattice, opposed
+from ..smoothing import cusp, cusp_slope, drag_weight, spiky, spiky_slope
 
 
 @wp.struct
@@ -22,19 +23,19 @@ class Numbers:
     face: float  # density at the face of a lattice, over that at rest [-]
     face_slope: float  # sum of the gradients there, over 1 / spacing [-]
     iterations: float  # of the density constraints in a substep
+    hourglass: float  # zeta l^2 of the hourglass control [m^2]
+    lattice: float  # makes the second moment of the spiky kernel's slope 1 on a lattice [-]
 
 
 # Floats in the rows that neighbours are asked for. Of density: position, volume. Of its constraints: the same |
 # multiplier, heft | motion since the substep began. Of velocities: position, volume | velocity. Of stress: the same |
-# stress (9).
+# stress (9), the traction that pulls back (3).
 PLACE, PUSH, MOVING, PULLING = 4, 12, 8, 16
 
 
 def distances(support_ratio: float) -> np.ndarray:
     """From a point of a cubic lattice of unit spacing to all that may be within its support, itself included."""
-    n = int(support_ratio) + 1
-    axis = np.arange(-n, n + 1, dtype=float)
-    return np.sqrt(np.ravel(sum(np.square(g) for g in np.meshgrid(axis, axis, axis))))
+    return np.linalg.norm(lattice(support_ratio), axis=1)
 
 
 def lattice_sum(kernel: Callable[[float, float], float], support_ratio: float) -> float:
@@ -51,13 +52,24 @@ def response(support_ratio: float) -> float:
     return float(felt @ moved / (moved @ moved))
 
 
+def second_moment(support_ratio: float) -> float:
+    """-sum r w' / 3 of the spiky kernel on a lattice of unit spacing, 1 in the continuum."""
+    return -sum(float(r) * spiky_slope(float(r), support_ratio) for r in distances(support_ratio)) / 3.0
+
+
+def stiffest(support_ratio: float) -> float:
+    """l over the spacing, which makes the shortest wave as stiff as stress between neighbours: ../hourglass.py. Pairs
+    weigh as in implicit viscosity, which so is as stiff as zeta = 1 from the longest to the shortest waves, to 2 %, and
+    holds what is explicit in it up to twice that (elastic_warp.py)."""
+    weights = [drag_weight(float(r) / support_ratio, support_ratio) for r in distances(support_ratio)]
+    return 1.0 / opposed(lattice(support_ratio), np.array(weights))
+
+
 def face_sums(support_ratio: float) -> tuple[float, float]:
     """(w, |grad s|) summed at the face of a cubic half lattice of unit spacing, over the sums of w and s within it: the
     kernels of `response`."""
-    n = int(support_ratio) + 1
-    axis = np.arange(-n, n + 1)
-    x, y, z = (np.ravel(g).astype(float) for g in np.meshgrid(axis, axis, axis))
-    half, r = z <= 0, np.sqrt(x * x + y * y + z * z)
+    z, r = lattice(support_ratio)[:, 2], distances(support_ratio)
+    half = z <= 0
     slopes = [spiky_slope(float(s), support_ratio) * u / s for s, u in zip(r[z < 0], z[z < 0], strict=True)]
     level = sum(cusp(float(s), support_ratio) for s in r[half]) / lattice_sum(cusp, support_ratio)
     return level, abs(sum(slopes)) / lattice_sum(spiky, support_ratio)

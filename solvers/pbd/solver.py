@@ -16,6 +16,7 @@ from fluidbench.native.pool import Pool
 from fluidbench.native.scene import FRICTION, Scene
 from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
+from fluidbench.scenario.material import Material
 
 from .. import aging
 from ..backends import LACKING, backend_of
@@ -29,7 +30,18 @@ from ..tool_map import Weights
 from ..viscosity import ImplicitViscosity, Tolerance, accuracy, beside
 from . import kernels_warp as kernels
 from .elasticity import Elasticity
-from .numbers import MOVING, PLACE, PULLING, PUSH, Numbers, face_sums, lattice_sum, response
+from .numbers import (
+    MOVING,
+    PLACE,
+    PULLING,
+    PUSH,
+    Numbers,
+    face_sums,
+    lattice_sum,
+    response,
+    second_moment,
+    stiffest,
+)
 
 
 class ConfigPBD(Config):
@@ -39,7 +51,14 @@ class ConfigPBD(Config):
     relaxation: Annotated[float, Field(gt=0)] = Field(0.2, description="constraint force mixing epsilon")
     over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
     viscous_tolerance: Tolerance = 1e-4
+    hourglass: Annotated[float, Field(ge=0, le=2)] = Field(
+        1.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows; 0 in what expands"
+    )
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
+
+    def zeta(self, material: Material) -> float:
+        """Of the hourglass control. It remembers where neighbours were: in what expands, children have others."""
+        return self.hourglass if material.expansion is None else 0.0
 
 
 # What constraints push in a substep goes as rho (d / dt)^2, and must match what stress and viscosity pull:
@@ -154,6 +173,9 @@ class SolverPBD(Solver):
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
         self.num.face, self.num.face_slope = face_sums(config.support_ratio)
         self.num.iterations = float(config.iterations)
+        length = stiffest(config.support_ratio) * scene.spacing
+        self.num.hourglass = config.zeta(scene.scenario.material) * length * length
+        self.num.lattice = 1.0 / second_moment(config.support_ratio)
         self.wall_friction_acts = FRICTION in (*scene.box.lower_kind, *scene.box.upper_kind)
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
@@ -256,6 +278,7 @@ class SolverPBD(Solver):
             crew.launch(aging.harden, pool.size, [*self._active(), due], [pool.phase])
         else:
             inputs = [*self._active(), self.scene.phases, due]
+            crew.launch(aging.relieve_off_linear, pool.size, [*inputs, pool.phase], [pool.off_linear])
             state = [pool.volume, pool.volume_ratio, pool.elastic_normal, pool.elastic_shear]
             crew.launch(aging.harden_at_ratio, pool.size, inputs, [pool.phase, *state])
 

@@ -20,6 +20,7 @@ from ..corrected_taichi import (
     symmetric_inverse,
 )
 from ..flow_taichi import pressure, shear_rate, strained
+from ..hourglass_taichi import off_linear_after
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, image_traction, image_velocity
 from ..pairs_taichi import (
@@ -266,8 +267,7 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                         turned = from_before(deformation, gradient, h)
                         b, s, kept = strained(phase, phase.shear_modulus, turned, b, s, h, i, plastic)
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
-                        spin = 0.5 * (gradient - gradient.transpose())
-                        z = kept * (z + h * (spin @ (z + 0.5 * h * spin @ z) + off))
+                        z = off_linear_after(z, gradient, off, kept, h)
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
                     sheared = shear_rate(gradient)
                 else:

@@ -29,11 +29,12 @@ from ..corrected import (
     symmetric_inverse,
 )
 from ..flow import pressure, shear_rate, strained
+from ..hourglass import off_linear
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
 from ..tool import Tool, felt, keep_out, seen_by_tool
-from .particle import Smoothing, broken, drifted, off_linear, out_of_crowd, pulled_back, straggling
+from .particle import Smoothing, broken, drifted, out_of_crowd, pulled_back, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 

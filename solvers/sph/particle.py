@@ -1,12 +1,7 @@
-"""What keeps SPH's particles in order: a pull against motion that no gradient shows, and shifting out of crowds.
+"""What keeps SPH's particles in order beside the common hourglass control (../hourglass.py): its damping, shifting out
+of crowds, and the customary artificial viscosity of stragglers.
 
-A velocity that alternates from particle to particle has no gradient at any of them, so no stress resists it (hourglass
-modes). What particle i moves off its neighbours' linear field is q_i = sum_j V_j (W'/r) (v_i - v_j) - L_i sum_j V_j
-(W'/r) r_ij [1/(m s)], zero in any linear flow; its integral z is a strain like the elastic tensor: it turns with the
-matter and is scaled back with the deviator. The traction g = l^2 (zeta G z + rho nu q) [Pa/m * m^2] pulls it back, with
-the transpose of q's own operator, so it does exactly the work of q: between partners (g_j - g_i) W'/r, and a share
-- g x sum_j V_j (W'/r) r_ij of the stress. Momentum and angular momentum stay. After the penalty of Zhang et al. (2024)
-with their linear prediction, but one memory a particle, and the transpose.
+SPH's weight of pairs is W'/r, and the traction g = l^2 (zeta G z + rho nu q) is damped, too.
 """
 
 import warp as wp
@@ -38,14 +33,6 @@ class Smoothing:
     shifting: float  # shift over strain and h^2 crowding [-]
     density_tolerance: float  # gap between the two that is left alone, over the density [-]
     density_feedback: float  # rate at which the integrated density follows the summed one, in c / h [-]
-
-
-@wp.func
-def off_linear(z: wp.vec3, gradient: wp.mat33, q: wp.vec3, kept: float, dt: float):
-    """z [1/m] after a step dt [s] in which the share `kept` of the deviator was kept. It turns to second order: to
-    first it would grow by (dt w)^2 / 2 a step."""
-    spin = 0.5 * (gradient - wp.transpose(gradient))
-    return kept * (z + dt * (spin * (z + (0.5 * dt) * (spin * z)) + q))
 
 
 @wp.func

@@ -12,6 +12,7 @@ from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import define
 from solvers.flow import shear_rate
+from solvers.hourglass import off_linear
 from solvers.lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from solvers.smoothing import wendland, wendland_slope
 from solvers.sph import particle
@@ -110,7 +111,7 @@ def test_a_linear_flow_is_not_pulled_back_wherever_particles_lie(name):
 
 def test_what_is_off_the_linear_flow_turns_with_matter_and_yields_with_it():
     spin = wp.mat33(0.0, -2.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    got = particle.off_linear(wp.vec3(1.0, 0.0, 4.0), spin, wp.vec3(0.0, 0.0, 10.0), 0.5, 0.1)
+    got = off_linear(wp.vec3(1.0, 0.0, 4.0), spin, wp.vec3(0.0, 0.0, 10.0), 0.5, 0.1)
     assert list(got) == pytest.approx([0.49, 0.1, 2.5])  # half of (cos 0.2, sin 0.2), to second order
     phase = Phase()
     phase.shear_modulus = 7.0
