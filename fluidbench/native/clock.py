@@ -26,6 +26,7 @@ class Hours:
     exit: wp.array(dtype=wp.vec3)  # where matter is let go [m]
     drift: wp.array(dtype=wp.vec3)  # its mean velocity until the next row [m/s]
     extruded: wp.array(dtype=float)  # time spent extruding [s]
+    pace: wp.array(dtype=float)  # share of the time until the next row that is [-]
     entered: wp.array(dtype=int)  # particles of the stream in the nozzle or beyond
     tick: float  # from row to row [s]
 
@@ -50,11 +51,18 @@ class Clock:
             hours.row = wp.zeros(1, dtype=int)
             hours.time, hours.extruded = wp.zeros(ROWS + 1, dtype=float), wp.zeros(ROWS + 1, dtype=float)
             hours.exit, hours.drift = wp.zeros(ROWS + 1, dtype=wp.vec3), wp.zeros(ROWS + 1, dtype=wp.vec3)
-            hours.entered = wp.zeros(ROWS + 1, dtype=int)
+            hours.entered, hours.pace = wp.zeros(ROWS + 1, dtype=int), wp.zeros(ROWS + 1, dtype=float)
 
     @cached_property
     def stream(self) -> Stream | None:
         return Stream(self.scenario) if self.scenario.nozzle is not None else None
+
+    @property
+    def bore(self) -> tuple[float, float]:
+        """Radius [m] of what feeds the stream, and the speed at which it does [m/s]; nothing where there is none."""
+        if self.stream is None:
+            return 0.0, 0.0
+        return 0.5 * self.stream.nozzle.diameter, self.stream.nozzle.speed
 
     @property
     def last_birth(self) -> float:
@@ -103,13 +111,15 @@ class Clock:
         columns = {"time": times}
         if track is not None and self.stream is not None:
             exits = self.stream.outlet(times)
-            step = np.diff(times)[:, None]
+            extruded, step = track.extruded(times), np.diff(times)
             columns |= {
                 "exit": exits,
                 "drift": np.diff(exits, axis=0, append=exits[-1:]),
-                "extruded": track.extruded(times),
+                "extruded": extruded,
+                "pace": np.diff(extruded, append=extruded[-1:]),
             }
-            columns["drift"][:-1] /= step
+            columns["drift"][:-1] /= step[:, None]
+            columns["pace"][:-1] /= step
             columns["entered"] = self._entered = self.stream.entered(times) * self.stream.points
             self._released = self.stream.released(times)
         for name, values in columns.items():

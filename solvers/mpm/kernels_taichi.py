@@ -22,6 +22,7 @@ from ..taichi_bridge import (
     ivec3,
     mat3,
     phase_at,
+    struct_of,
     symmetric,
     taichi_func,
     ti,
@@ -55,8 +56,10 @@ from .grid_taichi import (
     wrapped,
 )
 from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
+from .piston import Piston
 
 spline = taichi_func(quadratic_spline)
+PistonT = struct_of(Piston)
 
 
 @ti.func
@@ -272,6 +275,11 @@ def passes(alone: bool) -> SimpleNamespace:
         raw: Quads,
         dt: Floats,
         force: Forces,
+        piston: PistonT,
+        row: Ints,
+        exit: Vectors,
+        drift: Vectors,
+        pace: Floats,
         moving: Quads,
     ):
         for t in range(ti.min(active[0] * 64, raw.shape[0])):
@@ -294,6 +302,12 @@ def passes(alone: bool) -> SimpleNamespace:
                 if total[3] > 0.0:
                     kick = dt[world] * force_at(force, world, grid.origin + grid.dx * inside)
                     v = vec3(total[0], total[1], total[2]) / total[3] + kick
+                    if piston.on == 1:
+                        away = grid.origin + grid.dx * inside - exit[row[0]]
+                        within = away[0] * away[0] + away[1] * away[1] < piston.bore and away[2] > -0.5 * grid.dx[2]
+                        if within and pace[row[0]] > 0.0:
+                            going = drift[row[0]]
+                            v = vec3(going[0], going[1], ti.min(v[2], going[2] - pace[row[0]] * piston.speed))
                     density = total[3] * grid.inv_volume
                     if wall:
                         v = bounded(grid, inside, touching, v)

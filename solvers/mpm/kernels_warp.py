@@ -26,6 +26,7 @@ from .grid import (
     turns,
 )
 from .particle import FAULT_STENCIL, affine_of, inertia, moved, shifted, stressed, taken, weights
+from .piston import Piston, driven
 from .together import scatter_together, stencil
 from .walls import (
     beside,
@@ -140,10 +141,11 @@ def grid_step(
     raw: wp.array(dtype=wp.vec4),
     dt: wp.array(dtype=float),
     force: wp.array(dtype=Force),
+    piston: Piston,
     # outputs
     moving: wp.array(dtype=wp.vec4),
 ):
-    """Velocity of every node from momentum, gravity and walls; the fourth component is its density [kg/m^3].
+    """Velocity of every node from momentum, gravity, a piston and walls; the fourth component is its density [kg/m^3].
 
     Ghost nodes behind a mirroring wall get the mirrored velocity of their partner, so that the gather sees a true
     mirror: zeroing them instead costs energy at every step.
@@ -179,6 +181,8 @@ def grid_step(
                 place = grid.origin + wp.cw_mul(grid.dx, place)
                 kick = dt[world] * force_at(force[world], place)
                 v = wp.vec3(total[0], total[1], total[2]) / total[3] + kick
+                if piston.on == 1:
+                    v = driven(piston, grid, place, v)
                 if wall:
                     v = wall_velocity(grid, inside, touching, v)
                 density = total[3] * grid.inv_volume

@@ -32,6 +32,7 @@ from .by_block import ByBlock
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
 from .implicit import GridViscosity
 from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
+from .piston import piston_of
 from .pressed import roughly_pressed, unpressed
 from .tool import Held
 
@@ -177,6 +178,7 @@ class SolverMPM(Solver):
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
         self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots)
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
+        self.piston = piston_of(scene, not implicit and self.held is None)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
@@ -295,7 +297,7 @@ class SolverMPM(Solver):
     def walled(self, raw: wp.array, force: wp.array, moving: wp.array) -> None:
         """Velocities of nodes from their momenta and masses, a force for dt, and walls."""
         lanes = [self.grid, self.node_lanes, self.active, self.block_of, self.table]
-        self._launch("grid_step", self.node_lanes, [*lanes, raw, self.scene.dt, force], [moving])
+        self._launch("grid_step", self.node_lanes, [*lanes, raw, self.scene.dt, force, self.piston], [moving])
 
     def resist(self, nodes: wp.array, image: wp.array) -> None:
         """What viscosity resists the velocities of nodes with, added to momenta: dt A v of implicit.py."""

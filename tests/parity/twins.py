@@ -26,7 +26,7 @@ ROWS = {
     "places": PLACE,
     "pushes": [*PLACE, (4, 5), (5, 6), (8, 11)],
     "moving": [*PLACE, VELOCITY],
-    "pulling": [*PLACE, (4, 13)],
+    "pulling": [*PLACE, (4, 13), (13, 16)],
 }
 STATES = {
     8: [*PLACE, VELOCITY, (7, 8)],
@@ -45,6 +45,7 @@ def arrays_of(sim: Simulation) -> dict[str, wp.array]:
     found = {f"pool.{name}": array for name, array in sim.pool.fields.items()}
     found |= {"pool.count": sim.pool.count, "pool.fault": sim.pool.fault}
     found |= {name: getattr(sim.scene, name) for name in ("dt", "force", "phases")}
+    found |= {f"hours.{name}": getattr(sim.scene.clock.hours, name) for name in ("row", "exit", "drift", "pace")}
     parts = [("", sim.solver), *((prefix, getattr(sim.solver, name, None)) for prefix, name in PARTS)]
     for prefix, owner in parts:
         for name, value in vars(owner).items() if owner is not None else ():

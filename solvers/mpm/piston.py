@@ -1,0 +1,55 @@
+"""The piston of MPM: what is carried towards an outlet is pushed on at its own speed, whatever resists.
+
+What is carried gives its nodes its momentum anew in every step, with no more than its own mass: that is a force
+m (U - u) / dt, to which matter of stress sigma yields by U - u = sigma dt / (rho d). A stiff mortar held the grid at a
+quarter to a half of the piston's speed so, between bursts. So the nodes within the bore, from the row nearest to the
+exit upwards, move with the piston: no slower down, for what flows away faster is not held back, and sideways with the
+bore. Only while it extrudes: what lifts does not pull at what it has laid.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from fluidbench.native.scene import Scene
+
+from .grid import Grid
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+
+@wp.struct
+class Piston:
+    """Where the bore is, and how it moves: rows of ticks (fluidbench.native.clock)."""
+
+    on: int
+    bore: float  # radius squared [m^2]
+    speed: float  # of what leaves it while it extrudes [m/s]
+    row: wp.array(dtype=int)
+    exit: wp.array(dtype=wp.vec3)
+    drift: wp.array(dtype=wp.vec3)
+    pace: wp.array(dtype=float)
+
+
+def piston_of(scene: Scene, acts: bool) -> Any:
+    """The piston of a scene that is fed, if it `acts`."""
+    piston, hours = Piston(), scene.clock.hours
+    radius, speed = scene.clock.bore
+    for name in ("row", "exit", "drift", "pace"):
+        setattr(piston, name, getattr(hours, name))
+    if acts and radius > 0.0:
+        piston.on, piston.bore, piston.speed = 1, radius * radius, speed
+    return piston
+
+
+@wp.func
+def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
+    """The velocity [m/s] of a node at x that would have v."""
+    out = v
+    row = piston.row[0]
+    pace = piston.pace[row]
+    away = x - piston.exit[row]
+    if pace > 0.0 and away[2] > -0.5 * grid.dx[2] and away[0] * away[0] + away[1] * away[1] < piston.bore:
+        drift = piston.drift[row]
+        out = wp.vec3(drift[0], drift[1], wp.min(v[2], drift[2] - pace * piston.speed))
+    return out

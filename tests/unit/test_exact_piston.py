@@ -1,0 +1,79 @@
+"""MPM's piston by hand: which nodes it drives, how fast, and when."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from fluidbench.method.target import Target
+from fluidbench.native.simulation import Simulation
+from fluidbench.scenario.library import define
+from solvers.mpm.grid import Grid
+from solvers.mpm.piston import Piston, driven
+
+DOWN = -0.3  # of the nozzle at 0.2 m/s upwards, extruding half of the time at 1 m/s
+
+
+@wp.kernel
+def ask(piston: Piston, grid: Grid, places: wp.array(dtype=wp.vec3), velocity: wp.vec3, found: wp.array(dtype=wp.vec3)):
+    i = wp.tid()
+    found[i] = driven(piston, grid, places[i], velocity)
+
+
+def answers(places, velocity, pace=0.5):
+    """Of nodes that would move at `velocity`, about a nozzle of radius 0.1 at (1, 2, 3) that goes at (4, 5, 0.2)."""
+    piston, grid = Piston(), Grid()
+    piston.on, piston.bore, piston.speed = 1, 0.01, 1.0
+    piston.row, piston.pace = wp.array([1], dtype=int), wp.array([0.0, pace], dtype=float)
+    piston.exit, piston.drift = (wp.array([[0.0] * 3, row], dtype=wp.vec3) for row in ([1, 2, 3], [4, 5, 0.2]))
+    grid.dx = wp.vec3(0.04, 0.04, 0.02)
+    found = wp.zeros(len(places), dtype=wp.vec3)
+    wp.launch(ask, len(places), [piston, grid, wp.array(places, dtype=wp.vec3), wp.vec3(*velocity)], [found])
+    return found.numpy().astype(float)
+
+
+INSIDE = [[1, 2, 2.991], [1.099, 2, 3.5], [1.07, 2.07, 3.001]]
+OUTSIDE = [[1, 2, 2.989], [1.101, 2, 3.5], [1.08, 2.07, 3.001]]
+
+
+def test_it_drives_the_bore_from_the_row_nearest_to_the_exit_upwards():
+    assert answers(INSIDE, (7, 8, 9)) == pytest.approx(np.tile([4, 5, DOWN], (3, 1)))
+    assert answers(OUTSIDE, (7, 8, 9)) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
+
+
+def test_what_flows_away_faster_is_not_held_back():
+    assert answers(INSIDE, (7, 8, -0.5)) == pytest.approx(np.tile([4, 5, -0.5], (3, 1)))
+
+
+def test_a_nozzle_that_does_not_extrude_drives_nothing():
+    assert answers(INSIDE, (7, 8, 9), pace=0.0) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
+
+
+PASTE = {"density": 2000.0, "youngs_modulus": 1e5, "poisson_ratio": 0.45, "yield_stress": 1e3}
+SYRUP = {"density": 1000.0, "viscosity": 10.0, "sound_speed": 10.0}
+NOZZLE = {"diameter": 0.02, "exit_speed": 0.02, "standoff": 0.02}
+DROP = {"bodies": [{"kind": "sphere", "center": [0.05] * 3, "radius": 0.02}], "material": SYRUP}
+
+
+@pytest.mark.parametrize(
+    ("on", "table"),
+    [
+        (1, {"material": PASTE, "nozzle": NOZZLE}),
+        (1, {"material": SYRUP, "nozzle": NOZZLE}),
+        (0, {"material": SYRUP, "nozzle": NOZZLE, "numerics": {"mpm": {"viscosity": "implicit"}}}),
+        (0, {"material": SYRUP, "nozzle": NOZZLE | {"tip": "flat"}}),
+        (0, DROP),
+    ],
+    ids=["paste", "liquid", "implicit", "body", "drop"],
+)
+def test_it_acts_where_nothing_else_pushes(on, table):
+    """Beside a rigid body and with implicit viscosity what is carried passes its push on by itself."""
+    path = {"toolpath": {"kind": "line", "start": [0.04, 0.05], "end": [0.06, 0.05], "speed": 0.02}}
+    scenario = define(
+        "piston",
+        domain={"lower": [0, 0, 0], "upper": [0.1] * 3},
+        duration=0.1,
+        spacing=2.5e-3,
+        **table,
+        **(path if "nozzle" in table else {}),
+    )
+    assert Simulation(scenario, "mpm", Target()).solver.piston.on == on
