@@ -79,7 +79,7 @@ def _verdicts(row: Row) -> str:
 
 def _row(row: Row) -> dict[str, Any]:
     done = [r for r in row.bare if r.ok]
-    told = printed(row.variant, row.pool)
+    told = printed(row.variant, row.pool) if row.method == "mpm" else None
     return {
         "variant": row.variant,
         "machine": row.machine,
@@ -89,8 +89,8 @@ def _row(row: Row) -> dict[str, Any]:
         "steps_per_s": mean(row.speed()) if row.speed() else None,
         "wall_per_simulated_s": mean(row.pace()) if row.pace() else None,
         "wall_per_simulated_s_pictures": mean(row.pace(True)) if row.pace(True) else None,
-        "paper_wall_per_simulated_s": told.bare[0],
-        "paper_wall_per_simulated_s_pictures": told.filmed[0],
+        "paper_wall_per_simulated_s": told.bare[0] if told else None,
+        "paper_wall_per_simulated_s_pictures": told.filmed[0] if told else None,
         "repeats": len(done),
         "launches_per_substep": done[0].record.launches.get("per_substep") if done else None,
         "bytes": sum(done[0].record.bytes.values()) if done else None,
