@@ -16,7 +16,7 @@ from ..scenario import Scenario
 from .guide_report import report
 from .result import Result
 from .select import WALL_LIMIT, candidates, shares_cores
-from .selection import Selection, assess
+from .selection import Selection, Trust, assess
 from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number
 
 JOBS = {
@@ -141,24 +141,26 @@ def keep(jobs: Mapping[str, Selection], folder: Path) -> None:
                 "scenario": found.scenario and found.scenario.model_dump(mode="json"),
                 "runs": [run.folder.name for run in found.runs],
                 "untried": found.untried,
+                "trust": {method: [trust.passed, trust.judged] for method, trust in found.trust.items()},
             }
             for job, found in jobs.items()
-        },
-        "methods": list(dict.fromkeys(method for found in jobs.values() for method in found.trust)),
+        }
     }
     archive.keep(folder, NAME, index, (run for found in jobs.values() for run in found.runs))
 
 
 def restore(folder: Path) -> dict[str, Selection]:
-    """What a folder keeps, judged anew by the known answers of this edition."""
+    """What a folder keeps, assessed anew; methods are trusted as by the known answers of the edition that ran them."""
     index, runs = archive.restore(folder, NAME)
     try:
-        return {job: _again(told, index["methods"], runs) for job, told in index["jobs"].items()}
+        return {job: _again(told, runs) for job, told in index["jobs"].items()}
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(archive.another_edition(folder, error)) from None
 
 
-def _again(told: Mapping[str, Any], methods: Sequence[str], runs: Mapping[str, Run]) -> Selection:
+def _again(told: Mapping[str, Any], runs: Mapping[str, Run]) -> Selection:
     """A job's selection, assessed anew."""
     scenario = Scenario.model_validate(told["scenario"])
-    return assess(scenario, methods, [runs[name] for name in told["runs"]], scenario.measured, told["untried"])
+    trust = {method: Trust(*counts) for method, counts in told["trust"].items()}
+    made = [runs[name] for name in told["runs"]]
+    return assess(scenario, list(trust), made, scenario.measured, told["untried"], trust)

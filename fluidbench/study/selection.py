@@ -165,12 +165,14 @@ def assess(
     runs: Sequence[Run],
     measured: Sequence[Measured] = (),
     untried: Sequence[str] = (),
+    trust: dict[str, Trust] | None = None,
 ) -> Selection:
     """Errors of all candidates from finished runs, against what was `measured` where that is known; `untried` is what
-    there was no time for."""
+    there was no time for. Runs of an earlier edition bring the `trust` of its known answers along."""
     told = averages(measured)
     done = [run for run in runs if run.ok and not departures(run.record.measures)]
-    result = Selection([], trust_of(scenario, methods), {}, list(runs), untried=list(untried), scenario=scenario)
+    known = trust or trust_of(scenario, methods)
+    result = Selection([], known, {}, list(runs), untried=list(untried), scenario=scenario)
     fits: dict[str, dict[str, Fit]] = {}
     for method in methods:
         own = [r for r in done if r.method == method]

@@ -49,5 +49,4 @@ CASE = Case(
     fine_tolerance=0.10,
     scenarios=scenarios,
     evaluate=evaluate,
-    causes={"pbd": "columns that yield a little sink by 1 to 2 % of H more: 0.175 at H / 24, 0.143 at H / 36"},
 )

@@ -19,7 +19,7 @@ from fluidbench.study.ablation import Change, changes, effect
 from fluidbench.study.case import Finding, cases
 from fluidbench.study.limits import bisect, block, block_limit, default_dt
 from fluidbench.study.points import choose, measure_point, point_tasks, varied
-from fluidbench.study.selection import assess, confidence, trust_of
+from fluidbench.study.selection import Trust, assess, confidence, trust_of
 from fluidbench.study.trials import Trial
 
 from .made import finished
@@ -77,11 +77,11 @@ def record(method, spacing, **measures):
 
 
 def test_selection_extrapolates_and_knows_the_bias():
-    """Widths of exactly first order: MPM towards 10 mm, PBD towards 12; the known answers trust MPM on paste."""
+    """Widths of exactly first order: MPM towards 10 mm, PBD towards 12, of which MPM alone is trusted."""
     spacings = (1.0, 1.5, 2.0)
     runs = [record("mpm", d, bead_width_m=0.010 * (1 + 0.02 * d)) for d in spacings]
     runs += [record("pbd", d, bead_width_m=0.012 * (1 + 0.02 * d)) for d in spacings]
-    chosen = assess(load("line_bead"), ["mpm", "pbd"], runs)
+    chosen = assess(load("line_bead"), ["mpm", "pbd"], runs, trust={"mpm": Trust(1, 1), "pbd": Trust(0, 1)})
     assert chosen.trust["mpm"].trusted and not chosen.trust["pbd"].trusted
     assert chosen.limits["mpm"]["bead_width_m"] == pytest.approx(0.010)
     errors = {(c.method, c.spacing): c.error for c in chosen.candidates}
