@@ -59,8 +59,8 @@ class Clock:
 
     @property
     def bore(self) -> tuple[float, float]:
-        """Radius [m] of what feeds the stream, and the speed at which it does [m/s]; nothing where there is none."""
-        if self.stream is None:
+        """Radius [m] of what feeds the stream as a plug, and its speed [m/s]; nothing where no piston does."""
+        if self.stream is None or self.stream.nozzle.develops:
             return 0.0, 0.0
         return 0.5 * self.stream.nozzle.diameter, self.stream.nozzle.speed
 

@@ -56,7 +56,7 @@ from .grid_taichi import (
     wrapped,
 )
 from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
-from .piston import Piston
+from .piston import BELOW, Piston
 
 spline = taichi_func(quadratic_spline)
 PistonT = struct_of(Piston)
@@ -303,11 +303,12 @@ def passes(alone: bool) -> SimpleNamespace:
                     kick = dt[world] * force_at(force, world, grid.origin + grid.dx * inside)
                     v = vec3(total[0], total[1], total[2]) / total[3] + kick
                     if piston.on == 1:
+                        before = ti.max(row[0] - 1, 0)
                         away = grid.origin + grid.dx * inside - exit[row[0]]
-                        within = away[0] * away[0] + away[1] * away[1] < piston.bore and away[2] > -0.5 * grid.dx[2]
-                        if within and pace[row[0]] > 0.0:
-                            going = drift[row[0]]
-                            v = vec3(going[0], going[1], ti.min(v[2], going[2] - pace[row[0]] * piston.speed))
+                        within = away[0] ** 2 + away[1] ** 2 < piston.bore and away[2] > -BELOW * grid.dx[2]
+                        if within and pace[before] > 0.0:
+                            going = drift[before]
+                            v = vec3(going[0], going[1], ti.min(v[2], going[2] - pace[before] * piston.speed))
                     density = total[3] * grid.inv_volume
                     if wall:
                         v = bounded(grid, inside, touching, v)

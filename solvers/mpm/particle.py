@@ -22,8 +22,8 @@ IMPLICIT, EXPLICIT, PRESSED = wp.constant(0), wp.constant(1), wp.constant(2)
 # they share: a beam falls slowly off it.
 ANCHOR = wp.constant(1.0e4)
 STEEPEST = wp.constant(1.0 / 6.0)  # D dt / dx^2 up to which explicit diffusion is stable in three dimensions
-# Crowding on the grid that only clamps can make [-]; that only a piston can, which at some height over the nodes makes
-# any, and would shift what it lets go all the time.
+# Crowding on the grid that only clamps can make [-]; that only the feed beside a rigid body can, which at some height
+# over the nodes makes any, and would shift what it lets go all the time.
 ANCHORED, DRIVEN = wp.constant(10.0), wp.constant(1.5)
 PACKED = wp.constant(2.0)  # volume ratio, or one over it, beyond which nothing is let go [-]
 
@@ -101,10 +101,9 @@ def inertia(
 ):
     """With which a particle takes part in the momentum of its nodes [kg].
 
-    What is carried gives its nodes its momentum anew in every step: that pushes as long as viscosity drags on them for
-    no longer than an explicit step, and nothing resists but matter that is free. Elsewhere the piston lies as far above
-    the exit as nodes reach and yields to nothing; what is carried below it passes its push on by the pressure and
-    viscosity of a liquid.
+    With explicit viscosity and no rigid body the grid is pushed as piston.py says. Elsewhere what is carried is as
+    heavy as a clamp as far above the exit as nodes reach, and yields to nothing; what is carried below that passes its
+    push on by the pressure and viscosity of a liquid.
     (Not beneath a ceiling whose nodes it would share: these do not move.)
     """
     heavy = held == CLAMPED
@@ -252,7 +251,7 @@ def shifted(
 
     Matter that is stretched beyond the width of a cell leaves gaps between its particles that no stress holds open,
     and its volume is lost. Shifting fills them (Fick's law, Lind et al. 2012), in proportion to the strain that makes
-    them: what rests, flies or turns is left alone. `pitch` is 0 where a piston drives.
+    them: what rests, flies or turns is left alone. `pitch` is 0 beside a rigid body.
     """
     by = wp.vec3(0.0, 0.0, 0.0)
     crowding = sums[0, 3] * volume_ratio / phase.density

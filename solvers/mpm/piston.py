@@ -2,9 +2,10 @@
 
 What is carried gives its nodes its momentum anew in every step, with no more than its own mass: that is a force
 m (U - u) / dt, to which matter of stress sigma yields by U - u = sigma dt / (rho d). A stiff mortar held the grid at a
-quarter to a half of the piston's speed so, between bursts. So the nodes within the bore, from the row nearest to the
+quarter to a half of the piston's speed so, between bursts. So the nodes within the bore, from the first row at the
 exit upwards, move with the piston: no slower down, for what flows away faster is not held back, and sideways with the
-bore. Only while it extrudes: what lifts does not pull at what it has laid.
+bore. Only while it extrudes: what lifts does not pull at what it has laid. And only of a plug: where a profile has
+developed, matter at the rim hardly moves.
 """
 
 from typing import Any
@@ -17,6 +18,10 @@ from .grid import Grid
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
+# How far below the exit the first row of nodes may lie, in cells. What is pressed from farther below comes out wider;
+# where the first row lies more than the rest of a cell above it, the piston holds as little as none would.
+BELOW = wp.constant(0.3)
+
 
 @wp.struct
 class Piston:
@@ -25,7 +30,7 @@ class Piston:
     on: int
     bore: float  # radius squared [m^2]
     speed: float  # of what leaves it while it extrudes [m/s]
-    row: wp.array(dtype=int)
+    row: wp.array(dtype=int)  # of the end of the tick that substeps are in
     exit: wp.array(dtype=wp.vec3)
     drift: wp.array(dtype=wp.vec3)
     pace: wp.array(dtype=float)
@@ -47,9 +52,10 @@ def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
     """The velocity [m/s] of a node at x that would have v."""
     out = v
     row = piston.row[0]
-    pace = piston.pace[row]
+    before = wp.max(row - 1, 0)
+    pace = piston.pace[before]
     away = x - piston.exit[row]
-    if pace > 0.0 and away[2] > -0.5 * grid.dx[2] and away[0] * away[0] + away[1] * away[1] < piston.bore:
-        drift = piston.drift[row]
+    if pace > 0.0 and away[2] > -BELOW * grid.dx[2] and away[0] * away[0] + away[1] * away[1] < piston.bore:
+        drift = piston.drift[before]
         out = wp.vec3(drift[0], drift[1], wp.min(v[2], drift[2] - pace * piston.speed))
     return out

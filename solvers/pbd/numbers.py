@@ -59,8 +59,8 @@ def second_moment(support_ratio: float) -> float:
 
 def stiffest(support_ratio: float) -> float:
     """l over the spacing, which makes the shortest wave as stiff as stress between neighbours: ../hourglass.py. Pairs
-    weigh as in implicit viscosity, which so is as stiff as zeta = 1 from the longest to the shortest waves, to 2 %, and
-    holds what is explicit in it up to twice that (elastic_warp.py)."""
+    weigh as in implicit viscosity, which holds what is explicit in it up to twice its own stiffness (elastic_warp.py):
+    control at zeta = 1 and stress are together 1.01 times as stiff at most at H = 2.4, 1.8 at 3.5 and 1.4 at 2."""
     weights = [drag_weight(float(r) / support_ratio, support_ratio) for r in distances(support_ratio)]
     return 1.0 / opposed(lattice(support_ratio), np.array(weights))
 

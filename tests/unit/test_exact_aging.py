@@ -53,6 +53,14 @@ def test_what_is_not_elastic_changes_its_phase_alone():
     two.check(relieved=False)
 
 
+def test_what_pulls_back_strain_that_no_gradient_shows_carries_over():
+    """G z stays, with G fourfold; the phases are those before."""
+    two = Two()
+    off = wp.array(np.tile(SHEAR, (3, 1)).astype(np.float32), dtype=wp.vec3)
+    launch(aging.relieve_off_linear, 3, [3, two.count, two.phases, two.due, two.phase], [off])
+    assert off.numpy() == pytest.approx(np.stack([SHEAR / 4.0, SHEAR, SHEAR]), rel=1e-6)
+
+
 @pytest.mark.parametrize("ratio", [0.98, 1.02])
 def test_pressure_and_present_volume_carry_over_where_j_is_integrated(ratio):
     """K (1 / J - 1) stays, with K fourfold; V0 J stays."""

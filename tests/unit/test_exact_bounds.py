@@ -136,7 +136,8 @@ def test_formulas_name_the_numbers_that_were_used():
         ("sph", "viscous_number", (0.01, 0.11), (0.0, 0.111)),  # 0.111 is unstable
         ("sph", "force_number", (0.01, 1.0), (0.0, 1.01)),
         ("sph", "artificial_viscosity", (0.0, 9.0), (-0.01,)),
-        ("pbd", "support_ratio", (2.0, 4.0), (1.99, 4.01)),
+        ("pbd", "support_ratio", (2.0, 3.5), (1.99, 3.51)),
+        ("pbd", "hourglass", (0.0, 1.0), (-0.01, 1.01)),
         ("pbd", "advance", (0.01, 1.0), (0.0, 1.01)),
     ],
 )

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+from fluidbench.method.frame import CARRIED
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
 from fluidbench.scenario.library import define
@@ -23,19 +24,21 @@ def answers(places, velocity, pace=0.5):
     """Of nodes that would move at `velocity`, about a nozzle of radius 0.1 at (1, 2, 3) that goes at (4, 5, 0.2)."""
     piston, grid = Piston(), Grid()
     piston.on, piston.bore, piston.speed = 1, 0.01, 1.0
-    piston.row, piston.pace = wp.array([1], dtype=int), wp.array([0.0, pace], dtype=float)
-    piston.exit, piston.drift = (wp.array([[0.0] * 3, row], dtype=wp.vec3) for row in ([1, 2, 3], [4, 5, 0.2]))
+    piston.row, piston.pace = wp.array([2], dtype=int), wp.array([9.0, pace, 9.0], dtype=float)
+    nowhere = [9.0] * 3
+    piston.exit = wp.array([nowhere, nowhere, [1, 2, 3]], dtype=wp.vec3)
+    piston.drift = wp.array([nowhere, [4, 5, 0.2], nowhere], dtype=wp.vec3)
     grid.dx = wp.vec3(0.04, 0.04, 0.02)
     found = wp.zeros(len(places), dtype=wp.vec3)
     wp.launch(ask, len(places), [piston, grid, wp.array(places, dtype=wp.vec3), wp.vec3(*velocity)], [found])
     return found.numpy().astype(float)
 
 
-INSIDE = [[1, 2, 2.991], [1.099, 2, 3.5], [1.07, 2.07, 3.001]]
-OUTSIDE = [[1, 2, 2.989], [1.101, 2, 3.5], [1.08, 2.07, 3.001]]
+INSIDE = [[1, 2, 2.995], [1.099, 2, 3.5], [1.07, 2.07, 3.001]]
+OUTSIDE = [[1, 2, 2.993], [1.101, 2, 3.5], [1.08, 2.07, 3.001]]
 
 
-def test_it_drives_the_bore_from_the_row_nearest_to_the_exit_upwards():
+def test_it_drives_the_bore_from_the_first_row_at_the_exit_upwards():
     assert answers(INSIDE, (7, 8, 9)) == pytest.approx(np.tile([4, 5, DOWN], (3, 1)))
     assert answers(OUTSIDE, (7, 8, 9)) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
 
@@ -61,12 +64,14 @@ DROP = {"bodies": [{"kind": "sphere", "center": [0.05] * 3, "radius": 0.02}], "m
         (1, {"material": SYRUP, "nozzle": NOZZLE}),
         (0, {"material": SYRUP, "nozzle": NOZZLE, "numerics": {"mpm": {"viscosity": "implicit"}}}),
         (0, {"material": SYRUP, "nozzle": NOZZLE | {"tip": "flat"}}),
+        (0, {"material": PASTE, "nozzle": NOZZLE | {"profile": "developed"}}),
         (0, DROP),
     ],
-    ids=["paste", "liquid", "implicit", "body", "drop"],
+    ids=["paste", "liquid", "implicit", "body", "developed", "drop"],
 )
 def test_it_acts_where_nothing_else_pushes(on, table):
-    """Beside a rigid body and with implicit viscosity what is carried passes its push on by itself."""
+    """Beside a rigid body and with implicit viscosity what is carried passes its push on by itself; where a profile has
+    developed nothing goes as a plug."""
     path = {"toolpath": {"kind": "line", "start": [0.04, 0.05], "end": [0.06, 0.05], "speed": 0.02}}
     scenario = define(
         "piston",
@@ -77,3 +82,33 @@ def test_it_acts_where_nothing_else_pushes(on, table):
         **(path if "nozzle" in table else {}),
     )
     assert Simulation(scenario, "mpm", Target()).solver.piston.on == on
+
+
+def test_it_goes_as_what_is_carried_does():
+    """Around a corner, at the end of a stroke, in travel, and where the clock's rows are written anew."""
+    corner = {"kind": "polyline", "points": [[0.03, 0.03], [0.06, 0.03], [0.06, 0.05]], "speed": 0.02}
+    scenario = define(
+        "corner",
+        domain={"lower": [0, 0, 0], "upper": [0.1] * 3},
+        material=PASTE,
+        nozzle=NOZZLE,
+        toolpath=corner,
+        duration=2.6,
+        tick=2e-3,
+        spacing=5e-3,
+    )
+    sim = Simulation(scenario, "mpm", Target())
+    sim.prepare()
+    seen = set()
+    while sim.done < sim.ticks:
+        sim.advance_tick()
+        sim.look()
+        row, hours = int(sim.scene.clock.hours.row.numpy()[0]), sim.scene.clock.hours
+        drift, pace = hours.drift.numpy()[row - 1], float(hours.pace.numpy()[row - 1])
+        frame = sim.frame()
+        carried = frame["velocity"][frame["held"] == CARRIED]
+        piston = drift - [0.0, 0.0, pace * sim.solver.piston.speed]
+        if len(carried):
+            assert carried.mean(axis=0) == pytest.approx(piston, abs=1e-4)
+        seen.add(tuple(np.round(piston, 3)))
+    assert {(0.02, 0.0, -0.02), (0.0, 0.02, -0.02)} <= seen
