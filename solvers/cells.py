@@ -1,9 +1,16 @@
 """Cells as wide as the reach of neighbours, and who is in them: counted, given a place, gathered, put in order."""
 
+import math
+from collections.abc import Sequence
+
 import warp as wp
 
 from fluidbench.native.crew import index_of
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import Scene
 from fluidbench.native.vector_access import from_last, last_of_warp, store_vec4, sum_before
+
+from .backends import Backend
 
 wp.set_module_options({"enable_backward": False})
 NOBODY = wp.constant(-1)
@@ -101,3 +108,49 @@ def rank(share: wp.vec3i, position: wp.array(dtype=wp.vec3), cells: Cells):
 @wp.func
 def place(spot: wp.vec4):
     return wp.vec3(spot[0], spot[1], spot[2])
+
+
+def sides_for(across: Sequence[float], particles: int) -> list[int]:
+    """Cells of a grid on each axis: as many as there are in the domain, or so many that there is one a particle; powers
+    of two, and at least 4, so that no two of the 27 around a particle share a bucket."""
+    sides = [max(4, 1 << math.ceil(math.log2(max(cells + 2.0, 1.0)))) for cells in across]
+    while math.prod(sides) > max(2 * particles, 64) and max(sides) > 4:
+        sides[sides.index(max(sides))] //= 2
+    return sides
+
+
+class WhoIsWhere:
+    """What cells of an edge `width` [m] over a pool allocate, and their launches, which are Warp's."""
+
+    def __init__(self, scene: Scene, pool: Pool, width: float) -> None:
+        self.scene, self.pool = scene, pool
+        size, cells = pool.size, Cells()
+        cells.width = width
+        box = scene.box
+        across = [(box.upper[axis] - box.lower[axis]) / width for axis in range(3)]
+        sides = sides_for(across, pool.capacity)
+        cells.sides = wp.vec3i(*sides)
+        with wp.ScopedDevice(scene.device):
+            cells.spot = wp.zeros(size, dtype=wp.vec4)
+            cells.start, cells.number = (wp.zeros(pool.worlds * math.prod(sides), dtype=int) for _ in range(2))
+            cells.bucket, cells.arrived, cells.members = (wp.zeros(size, dtype=int) for _ in range(3))
+            cells.handed = wp.zeros(1, dtype=int)
+        self.cells = cells
+
+    def prepare(self) -> None:
+        self.scene.crew.load(__name__)
+
+    def tell(self, backend: Backend) -> None:
+        """Enqueue: find out who is in which cell."""
+        pool, cells = self.pool, self.cells
+        buckets = cells.number.shape[0]
+        backend.launch(empty, buckets, [cells])
+        backend.launch(tally, pool.size, [pool.capacity, pool.count, pool.position, cells])
+        backend.launch(hand_out, buckets, [cells])
+        backend.launch(gather, pool.size, [cells])
+        backend.launch(rank, pool.size, [pool.position, cells])
+
+    def footprint(self) -> int:
+        """Bytes."""
+        names = ("bucket", "spot", "start", "number", "arrived", "members")
+        return sum(getattr(self.cells, name).capacity for name in names)

@@ -24,21 +24,18 @@ def plastic_strains(scene: Scene, pool: Pool) -> wp.array:
 
 
 @wp.func
-def strained(
-    phase: Phase,
-    modulus: float,
-    l: wp.mat33,
-    b: wp.vec3,
-    s: wp.vec3,
-    h: float,
-    i: int,
-    plastic: wp.array(dtype=float),
-):
-    """The elastic tensor of particle i after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz,
-    yz; the share of its deviator that was kept. Its plastic strain grows where it hardens."""
+def threshold_of(phase: Phase, i: int, plastic: wp.array(dtype=float)):
+    """The yield stress of particle i now [Pa]."""
     threshold = phase.yield_stress
     if phase.hardening > 0.0:
         threshold = hardened(threshold, phase.saturated_yield_stress, phase.hardening, plastic[i])
+    return threshold
+
+
+@wp.func
+def advanced(phase: Phase, modulus: float, threshold: float, l: wp.mat33, b: wp.vec3, s: wp.vec3, h: float):
+    """The elastic tensor after a step h [s] under the velocity gradient l, its diagonal b, and s: xy, xz, yz; the share
+    of its deviator that was kept."""
     xx, yy, zz, xy, xz, yz, kept = strain_and_flow(
         l[0, 0], l[0, 1], l[0, 2],
         l[1, 0], l[1, 1], l[1, 2],
@@ -51,9 +48,25 @@ def strained(
         phase.relaxation_rate,
         h,
     )  # fmt: skip
-    if phase.hardening > 0.0:
-        plastic[i] = plastic[i] + plastic_strain(xx, yy, zz, xy, xz, yz, kept)
     return wp.vec3(xx, yy, zz), wp.vec3(xy, xz, yz), kept
+
+
+@wp.func
+def strained(
+    phase: Phase,
+    modulus: float,
+    l: wp.mat33,
+    b: wp.vec3,
+    s: wp.vec3,
+    h: float,
+    i: int,
+    plastic: wp.array(dtype=float),
+):
+    """The same of particle i, whose plastic strain grows where it hardens."""
+    b, s, kept = advanced(phase, modulus, threshold_of(phase, i, plastic), l, b, s, h)
+    if phase.hardening > 0.0:
+        plastic[i] = plastic[i] + plastic_strain(b[0], b[1], b[2], s[0], s[1], s[2], kept)
+    return b, s, kept
 
 
 @wp.func

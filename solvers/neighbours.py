@@ -16,8 +16,9 @@ from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 from fluidbench.scenario.expansion import Expansion
 
-from . import cells, search
+from . import search
 from .backends import Backend
+from .cells import WhoIsWhere
 from .order import CellOrder
 
 ROOM = 1.7  # how much denser than a lattice matter may get before its lists overflow
@@ -66,18 +67,7 @@ class Neighbours:
         self._allocate_cells()
 
     def _allocate_cells(self) -> None:
-        size, grid = self.pool.size, cells.Cells()
-        grid.width = self.reach
-        box = self.scene.box
-        across = [(box.upper[axis] - box.lower[axis]) / self.reach for axis in range(3)]
-        sides = sides_for(across, self.pool.capacity)
-        grid.sides = wp.vec3i(*sides)
-        with wp.ScopedDevice(self.scene.device):
-            grid.spot = wp.zeros(size, dtype=wp.vec4)
-            grid.start, grid.number = (wp.zeros(self.pool.worlds * math.prod(sides), dtype=int) for _ in range(2))
-            grid.bucket, grid.arrived, grid.members = (wp.zeros(size, dtype=int) for _ in range(3))
-            grid.handed = wp.zeros(1, dtype=int)
-        self.cells = grid
+        self.who = WhoIsWhere(self.scene, self.pool, self.reach)
 
     @property
     def work(self) -> int:
@@ -86,8 +76,8 @@ class Neighbours:
 
     def prepare(self) -> None:
         """Compile the search."""
-        for module in (cells, search):
-            self.scene.crew.load(module)
+        self.who.prepare()
+        self.scene.crew.load(search)
 
     def refresh(self) -> None:
         """The pool was changed from outside: make the lists anew at the next substep."""
@@ -105,13 +95,8 @@ class Neighbours:
         wp.capture_if(self.outdated, on_true=self._renew)
 
     def _renew(self) -> None:
-        pool, grid = self.pool, self.cells
-        buckets = grid.number.shape[0]
-        self.backend.launch(cells.empty, buckets, [grid])
-        self.backend.launch(cells.tally, pool.size, [pool.capacity, pool.count, pool.position, grid])
-        self.backend.launch(cells.hand_out, buckets, [grid])
-        self.backend.launch(cells.gather, pool.size, [grid])
-        self.backend.launch(cells.rank, pool.size, [pool.position, grid])
+        pool = self.pool
+        self.who.tell(self.backend)
         on_cpu = self.scene.device.is_cpu
         self.backend.launch(
             search.fill_lists if on_cpu else search.fill_in_teams,
@@ -122,7 +107,7 @@ class Neighbours:
                 pool.count,
                 self.reach,
                 self.limit,
-                grid,
+                self.who.cells,
                 pool.position,
                 self.lists,
             ],
@@ -142,11 +127,11 @@ class Neighbours:
         lists = (self.entries, self.number, self.inside, self.listed)
         return {
             "neighbour lists": sum(array.capacity for array in lists),
-            "neighbour cells": sum(array.capacity for array in self._cell_arrays()),
+            "neighbour cells": self._cell_bytes(),
         }
 
-    def _cell_arrays(self) -> list[wp.array]:
-        return [getattr(self.cells, name) for name in ("bucket", "spot", "start", "number", "arrived", "members")]
+    def _cell_bytes(self) -> int:
+        return self.who.footprint()
 
 
 def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> Neighbours:
@@ -166,15 +151,6 @@ def side_by_side(scene: Scene, pool: Pool) -> CellOrder:
 def room(reach_ratio: float) -> int:
     """Entries to allow for: 1.7 times those of a lattice. Odd multiples of 8, lest rows collide in the cache."""
     return 16 * math.ceil(ROOM * 4.0 / 3.0 * math.pi * reach_ratio**3 / 16.0) + 8
-
-
-def sides_for(across: Sequence[float], particles: int) -> list[int]:
-    """Cells of a grid on each axis: as many as there are in the domain, or so many that there is one a particle; powers
-    of two, and at least 4, so that no two of the 27 around a particle share a bucket."""
-    sides = [max(4, 1 << math.ceil(math.log2(max(cells + 2.0, 1.0)))) for cells in across]
-    while math.prod(sides) > max(2 * particles, 64) and max(sides) > 4:
-        sides[sides.index(max(sides))] //= 2
-    return sides
 
 
 def threads_for(particles: int, entries: float) -> int:

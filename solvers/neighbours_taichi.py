@@ -302,5 +302,5 @@ class TaichiNeighbours(Neighbours):
             [self.entries, self.number, self.inside, self.listed, pool.fault, self.outdated],
         )
 
-    def _cell_arrays(self) -> list[wp.array]:
-        return [self.key, self.start, self.filled, self.members]
+    def _cell_bytes(self) -> int:
+        return sum(array.capacity for array in (self.key, self.start, self.filled, self.members))

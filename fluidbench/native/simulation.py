@@ -161,6 +161,7 @@ class Simulation(Session):
         """The audit, what happens to the material, and the substeps: replayed, but the first time in a process and
         where births need the host."""
         on_cpu, births = self.scene.device.is_cpu, self._births_due()
+        arranging = self.solver.arranges > 0 and self.done % self.solver.arranges == 0
         audited, self.unseen = self.unseen or on_cpu, False  # on a GPU what nobody has looked at since is ours
         if not self._use_graphs or self.aged == 0 or births:
             if audited:
@@ -170,21 +171,23 @@ class Simulation(Session):
             self.scene.clock.struck()
             self._refresh()
             self.scene.set_dt(steps.dt)
+            if arranging:
+                self._wait()
+                self.solver.arrange()
             self._run(steps.substeps)
             return
         self.scene.set_dt(steps.dt)
-        (stale, self.pool.stale), clock = (self.pool.stale, False), self.scene.clock
+        first = audited, feeding, self.pool.stale, arranging
+        self.pool.stale = False
         if on_cpu:  # where replay is free
-            start = self.scene.crew.recorded(
-                (audited, feeding, stale), lambda: self._start_tick(audited, feeding, stale)
-            )
+            start = self.scene.crew.recorded(first, lambda: self._start_tick(*first))
             self.scene.crew.replay([(start, 1), (self.scene.crew.recorded(1, self._substep), steps.substeps)])
         else:
-            key = audited, feeding, stale, steps.substeps
-            self.scene.crew.replay([(self.scene.crew.recorded(key, lambda: self._whole_tick(*key)), 1)])
-        clock.struck()
+            whole = *first, steps.substeps
+            self.scene.crew.replay([(self.scene.crew.recorded(whole, lambda: self._whole_tick(*whole)), 1)])
+        self.scene.clock.struck()
 
-    def _start_tick(self, audited: bool, feeding: bool, stale: bool) -> None:
+    def _start_tick(self, audited: bool, feeding: bool, stale: bool, arranging: bool) -> None:
         """Enqueue all of a tick but its substeps."""
         if audited:
             self.health.audit()
@@ -192,9 +195,11 @@ class Simulation(Session):
         self.scene.clock.strike()
         if stale:
             self.solver.refresh()
+        if arranging:
+            self.solver.arrange()
 
-    def _whole_tick(self, audited: bool, feeding: bool, stale: bool, substeps: int) -> None:
-        self._start_tick(audited, feeding, stale)
+    def _whole_tick(self, audited: bool, feeding: bool, stale: bool, arranging: bool, substeps: int) -> None:
+        self._start_tick(audited, feeding, stale, arranging)
         for _ in range(substeps):
             self._substep()
 

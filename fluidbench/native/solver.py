@@ -23,6 +23,7 @@ class Solver(Method):
 
     passes: ClassVar[tuple[str, ...]]
     faults: ClassVar[dict[int, str]] = {}
+    arranges: int = 0  # ticks from one call of `arrange` to the next; 0 for never
     backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
 
     @classmethod
@@ -61,6 +62,10 @@ class Solver(Method):
     def refresh(self) -> None:
         """Enqueue what must follow when particles have appeared, moved in memory or were moved: between substeps, the
         first time outside any graph, later recorded like `substep`."""
+
+    def arrange(self) -> None:
+        """Enqueue, every `arranges` ticks before their substeps and recorded like them: particles into a better order,
+        which is no motion of matter."""
 
     def settle(self) -> None:
         """Enqueue, between substeps and recorded like them, when parents have had children, which lie over others. A

@@ -121,14 +121,14 @@ class Stream:
 
     @cached_property
     def offset(self) -> np.ndarray:
-        """Of a row's particles about the nozzle axis: all of a disc (n, 2), or each row's one (rows, 2) [m]; those
-        turn about the axis from row to row, or they would follow each other in threads."""
-        if not self.nozzle.develops:
-            return self.offsets
+        """Of each particle about the nozzle axis, shape (particles, 2) [m]. Rows turn about the axis, each by a golden
+        angle more than the one before: particles would follow each other in threads, with gaps between that no
+        method's stress closes."""
         point, extruding = self._rows
-        x, y = self.offsets[point].T
-        turn = GOLDEN * np.rint(extruding * self.nozzle.speed * self.pace / self.scenario.spacing - 0.5)
-        return np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)], axis=1)
+        row = np.rint(extruding * self.nozzle.speed * self.pace / self.scenario.spacing - 0.5)
+        cos, sin = np.cos(GOLDEN * row)[:, None], np.sin(GOLDEN * row)[:, None]
+        x, y = np.moveaxis(self.offsets[point][:, None] if self.nozzle.develops else self.offsets[None], -1, 0)
+        return np.stack([x * cos - y * sin, x * sin + y * cos], axis=-1).reshape(-1, 2)
 
     @property
     def extruding(self) -> np.ndarray:

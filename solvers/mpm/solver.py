@@ -34,6 +34,7 @@ from .implicit import GridViscosity
 from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
 from .piston import piston_of
 from .pressed import roughly_pressed, unpressed
+from .separation import EVERY, Separation
 from .tool import Held
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
@@ -48,6 +49,9 @@ class ConfigMPM(Config):
     advection: Annotated[float, Field(gt=0, lt=1.0)] = Field(0.5, description="cells that matter may cross in a step")
     shifting: Annotated[float, Field(ge=0)] = Field(
         8.0, description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2"
+    )
+    separation: Annotated[float, Field(ge=0)] = Field(
+        0.5, description="shift of particles that are too near each other, over strain and crowding"
     )
     viscosity: Scheme = Field(
         "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
@@ -111,7 +115,7 @@ class SolverMPM(Solver):
         return [
             Economy("coarser grid", {"grid_ratio": round(min(1.33 * config.grid_ratio, 4.0), 3)}),
             Economy("larger dt", {"safety": 1.0}),
-            Economy("no shifting", {"shifting": 0.0}),
+            Economy("no shifting", {"shifting": 0.0, "separation": 0.0}),
         ]
 
     @classmethod
@@ -178,6 +182,9 @@ class SolverMPM(Solver):
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
         self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots)
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
+        apart = config.separation > 0.0 and not scene.expands and self.held is None
+        self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
+        self.arranges = EVERY if apart else 0
         self.piston = piston_of(scene, not implicit and self.held is None)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
@@ -217,6 +224,12 @@ class SolverMPM(Solver):
             getattr(self, name)()
         self.backend.wait()
         wp.copy(self.pool.velocity, velocity)
+
+    def arrange(self) -> None:
+        assert self.separation is not None
+        self.empty(self.raw)
+        homes = None if self.by_block is None else self.by_block.homes
+        self.separation.part(self.table, self.block_of, self.active, self.raw, homes)
 
     def substep(self) -> None:
         if self.scene.grows:
@@ -362,6 +375,8 @@ class SolverMPM(Solver):
             self.scene.crew.load(aging)
         self.order.prepare()
         self.backend.prepare(self)
+        if self.separation is not None:
+            self.separation.prepare()
         if self.by_block is not None:
             self.by_block.prepare()
         self.started = False
@@ -404,4 +419,5 @@ class SolverMPM(Solver):
         names = ("table", "block_of", "raw", "moving")
         more = {} if self.by_block is None else self.by_block.footprint()
         more |= {} if self.held is None else self.held.footprint()
+        more |= {} if self.separation is None else self.separation.footprint()
         return {name: getattr(self, name).capacity for name in names} | more | footprint_of(self.viscosity)

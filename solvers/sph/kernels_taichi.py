@@ -19,6 +19,7 @@ from ..corrected_taichi import (
     strain_by_chords,
     symmetric_inverse,
 )
+from ..crowding import FARTHEST
 from ..flow_taichi import pressure, shear_rate, strained
 from ..hourglass_taichi import off_linear_after
 from ..images import WALL_INSET
@@ -55,7 +56,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .kernels_warp import CRUSHED, FLOOR, MATTER, STATE
-from .particle import FARTHEST, WHOLE, Smoothing
+from .particle import WHOLE, Smoothing
 
 kernel = taichi_func(wendland)
 slope = taichi_func(wendland_slope)

@@ -28,13 +28,14 @@ from ..corrected import (
     strain_by_chords,
     symmetric_inverse,
 )
+from ..crowding import excess, out_of_crowd
 from ..flow import pressure, shear_rate, strained
 from ..hourglass import off_linear
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
 from ..smoothing import wendland, wendland_slope
 from ..tool import Tool, felt, keep_out, seen_by_tool
-from .particle import Smoothing, broken, drifted, out_of_crowd, pulled_back, straggling
+from .particle import Smoothing, broken, drifted, pulled_back, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -158,9 +159,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             carried *= share
         spread = w * (own[7] - partner - wp.dot(wp.vec3(own[8], own[9], own[10]) + carried, r))
         m = w * r
-        near = kernel(wp.sqrt(r2) / num.h, num.h) / num.near
-        near *= near
-        crowd = wp.max(near * near - 1.0, 0.0) * m
+        crowd = excess(wp.sqrt(r2), num.h, num.near) * m
         if wp.static(strength):
             return Strong(
                 spread, m[0], m[1], m[2], crowd[0], crowd[1], crowd[2],

@@ -1,5 +1,5 @@
-"""What keeps SPH's particles in order beside the common hourglass control (../hourglass.py): its damping, shifting out
-of crowds, and the customary artificial viscosity of stragglers.
+"""What keeps SPH's particles in order beside the common hourglass control (../hourglass.py) and shifting out of crowds
+(../crowding.py): the damping of the one, who feels the other, and the customary artificial viscosity of stragglers.
 
 SPH's weight of pairs is W'/r, and the traction g = l^2 (zeta G z + rho nu q) is damped, too.
 """
@@ -14,7 +14,6 @@ from ..corrected import EDGE, SOUND
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
-FARTHEST = wp.constant(0.2)  # of h^2 crowd, in a step: beyond it partners would change places
 
 
 @wp.struct
@@ -58,17 +57,6 @@ def broken(crowd: wp.vec3, limit: float):
     """What crowds a particle of matter that does not flow [1/m]: the excess over what one partner does at 0.6 d, nearer
     than any elastic strain brings them. A lattice that is pressed together keeps its order by itself."""
     return wp.max(1.0 - limit / wp.max(wp.length(crowd), 1.0e-12), 0.0) * crowd
-
-
-@wp.func
-def out_of_crowd(crowd: wp.vec3, h: float, strain: float):
-    """How far a particle is shifted [m] while matter shears by `strain` times the constant: -strain h^2 crowd.
-
-    `crowd` [1/m] is sum_j V_j grad W (W^4 / W(r0)^4 - 1) over partners nearer than r0 = 0.9 d: the shifting of Lind et
-    al. (2012), by the tensile control of Monaghan (2000) alone. Partners push each other alike where both shear alike;
-    a lattice and its free surface feel nothing; what rests, flies or turns does not shear.
-    """
-    return -(wp.min(strain, FARTHEST) * h * h) * crowd
 
 
 @wp.func

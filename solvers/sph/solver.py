@@ -21,12 +21,13 @@ from .. import aging
 from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
+from ..crowding import crowding, nearest
 from ..flow import plastic_strains
 from ..lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import wendland, wendland_slope
+from ..smoothing import wendland_slope
 from ..theory import sph_numbers, stable_dt
 from ..tool import table_of, tool_of
 from ..tool_map import Weights
@@ -37,17 +38,10 @@ from .particle import Smoothing
 
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 SPRAYED = 3.0  # particles across what is fed below which a paste that lands is sprayed: seen at 2.4, not at 3.4
-CLOSE = 0.9  # distance below which particles are moved apart, in spacings
 BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
 HOURGLASS_SAFETY = 0.8  # for the stress and the pressure act on the same waves
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
 FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
-
-
-def crowding(r: float, d: float, h: float) -> float:
-    """How much one partner at a distance r [m] crowds a particle [1/m], see `out_of_crowd`."""
-    excess = (wendland(r / h, h) / wendland(CLOSE * d / h, h)) ** 4 - 1.0
-    return d**3 * -wendland_slope(r / h, h) * r * excess
 
 
 def weights(h: float, implicit: bool) -> Weights:
@@ -171,7 +165,7 @@ class SolverSPH(Solver):
         self.num = Smoothing()
         ratio = config.smoothing(scene.scenario.material)
         self.num.h = ratio * scene.spacing
-        self.num.near = wendland(CLOSE * scene.spacing / self.num.h, self.num.h)
+        self.num.near = nearest(scene.spacing, self.num.h)
         self.num.broken = crowding(BROKEN * scene.spacing, scene.spacing, self.num.h)
         self.num.lattice, self.num.viscous_lattice = 1.0 / lattice_moments(ratio)[0], viscous_scale(ratio)
         self.num.density_diffusion = config.density_diffusion

@@ -239,7 +239,7 @@ def test_launches_are_captured_or_waited_for():
     captured.advance_tick()
     assert list(captured.scene.crew.graphs) == ["audit", 1] and captured._use_graphs
     captured.advance_tick()
-    assert list(captured.scene.crew.graphs) == ["audit", 1, (True, False, False)]
+    assert list(captured.scene.crew.graphs) == ["audit", 1, (True, False, False, False)]
 
 
 def test_layers_come_at_their_time_and_carry_no_spin():

@@ -82,13 +82,16 @@ class Twins:
 
     def _least_scales(self) -> dict[str, float]:
         """Of what is made of numbers that cancel: SPH's shifts of crowding of order 1 / h, PBD's multipliers of
-        densities of order 1, its stress of elastic tensors of order 1."""
+        densities of order 1, its stress of elastic tensors of order 1, MPM's momenta of pushes on one of 27 nodes."""
         sim = self.warp
         if self.method == "sph":
             speed, dt = float(np.abs(sim.pool.velocity.numpy()).max()), float(sim.scene.dt.numpy()[0])
             return {"shift": sim.config.shifting * dt * speed / sim.scene.spacing * sim.solver.num.h}
-        if self.method != "pbd":
-            return {}
+        if self.method == "mpm":
+            dt, volume = float(sim.scene.dt.numpy()[0]), float(sim.pool.volume.numpy().max())
+            squeezed = float(np.abs(sim.pool.volume_ratio.numpy() - 1.0).max())
+            pressure = squeezed * float(sim.scene.phases.numpy()["bulk_modulus"].max())
+            return {"raw": 4.0 * dt * volume * pressure / float(min(sim.solver.grid.dx)) / 27.0}
         stiffness = float(sim.scene.phases.numpy()["shear_modulus"].max())
         return {"pushes[4:5]": 1.0, "pulling[4:13]": max(stiffness, 1e-30)}
 
@@ -183,7 +186,8 @@ class Twins:
 
     def _nodes(self, name: str, a: np.ndarray, b: np.ndarray) -> Iterator[str]:
         """Nodes of the grid, momentum (or velocity) and mass (or density) apart: each against its own size, or that of
-        the middle one of those that hold anything; clamps weigh ten thousand times more than what they hold."""
+        the middle one of those that hold anything, or of what cancels; clamps weigh ten thousand times more than what
+        they hold."""
         filled = a[:, 3] != 0
         if (b[~filled] != a[~filled]).any():
             yield f"{name} differs in empty nodes"
@@ -192,7 +196,8 @@ class Twins:
             return
         for what, part in (("vectors", slice(0, 3)), ("scalars", slice(3, 4))):
             size = np.linalg.norm(a[:, part], axis=1)
-            off = np.linalg.norm((a - b)[:, part], axis=1) / np.maximum(size, max(float(np.median(size)), 1e-30))
+            least = max(float(np.median(size)), self.least.get(name, 0.0) if what == "vectors" else 0.0, 1e-30)
+            off = np.linalg.norm((a - b)[:, part], axis=1) / np.maximum(size, least)
             if not off.max(initial=0.0) <= TOLERANCE:
                 yield f"{name}: {what} differ by {off.max():.2g} of their size"
 

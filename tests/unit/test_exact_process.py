@@ -31,6 +31,13 @@ def fed(*densities, **more):
     return pool, Emission(scene, pool), Stream(made[0])
 
 
+def turned(points, disc):
+    """Places (n, 2) of a disc's points, of which each disc turns on by a golden angle, 137.5 degrees."""
+    angle = np.radians(137.50776405003785) * disc
+    x, y = np.asarray(points).T
+    return np.column_stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)])
+
+
 def test_discs_stand_in_the_nozzle_a_spacing_apart_and_move_on_with_it():
     """After 0.5 ms: five discs, the first 0.95 mm above the exit at z = 10 mm; nozzle and piston move at 0.1 m/s."""
     pool, emission, stream = fed(1000.0, 2500.0)
@@ -40,7 +47,8 @@ def test_discs_stand_in_the_nozzle_a_spacing_apart_and_move_on_with_it():
     for world, density in enumerate((1000.0, 2500.0)):
         frame = {name: values[64:] for name, values in pool.snapshot(world).items()}
         disc, point = np.divmod(np.arange(5 * n), n)
-        place = np.column_stack([5e-5 + stream.offsets[point, 0], stream.offsets[point, 1], 0.01095 + 0.002 * disc])
+        x, y = turned(stream.offsets[point], disc).T
+        place = np.column_stack([5e-5 + x, y, 0.01095 + 0.002 * disc])
         assert frame["position"] == pytest.approx(place, abs=1e-8)
         assert frame["velocity"] == pytest.approx(np.tile([0.1, 0.0, -0.1], (5 * n, 1)), abs=1e-5)
         assert set(frame["held"]) == {int(CARRIED)} and list(frame["origin"]) == list(range(64, 64 + 5 * n))
@@ -59,9 +67,8 @@ def test_discs_leave_at_their_time_and_have_flown_since():
     assert list(frame["held"]) == [int(FREE)] * 2 * n + [int(CARRIED)] * (len(frame["held"]) - 2 * n)
     for disc, (left, late) in enumerate([(0.001, 0.0205), (0.003, 0.0005)]):
         part = slice(disc * n, (disc + 1) * n)
-        place = np.column_stack(
-            [left + 0.1 * late + stream.offsets[:, 0], stream.offsets[:, 1], np.full(n, 0.01 - 0.1 * late)]
-        )
+        x, y = turned(stream.offsets, disc).T
+        place = np.column_stack([left + 0.1 * late + x, y, np.full(n, 0.01 - 0.1 * late)])
         assert frame["position"][part] == pytest.approx(place, abs=1e-8)
         assert frame["velocity"][part] == pytest.approx(np.tile([0.1, 0.0, -0.1], (n, 1)), abs=1e-6)
     block = pool.snapshot()
@@ -77,7 +84,7 @@ def test_carried_discs_head_for_their_place_at_the_next_tick_wherever_they_lag()
     emission.advance(0.03, 0.02)
     frame = {name: values[64:] for name, values in pool.snapshot().items()}
     assert (frame["held"][: 2 * n] == int(FREE)).all() and (frame["held"][2 * n :] == int(CARRIED)).all()
-    on_time = frame["position"][n : 2 * n, :2] - stream.offsets  # released at this very moment
+    on_time = frame["position"][n : 2 * n, :2] - turned(stream.offsets, 1)  # released at this very moment
     assert on_time == pytest.approx(np.tile([0.003, 0.0], (n, 1)), abs=1e-8)
     assert frame["velocity"][2 * n : 3 * n] == pytest.approx(np.tile([0.2, 0.05, -0.25], (n, 1)), abs=1e-5)
     assert frame["velocity"][-n:] == pytest.approx(np.tile([0.05, 0.05, -0.1], (n, 1)), abs=1e-5)

@@ -11,12 +11,12 @@ from fluidbench.native.scene import Phase
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import define
+from solvers.crowding import crowding, out_of_crowd
 from solvers.flow import shear_rate
 from solvers.hourglass import off_linear
 from solvers.lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from solvers.smoothing import wendland, wendland_slope
 from solvers.sph import particle
-from solvers.sph.solver import crowding
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
 SIDE = 8
@@ -127,9 +127,9 @@ def test_rate_of_shear():
 
 def test_particles_leave_a_crowd_as_fast_as_matter_shears():
     crowd = wp.vec3(2.0, 0.0, -1.0)
-    assert list(particle.out_of_crowd(crowd, 0.5, 0.01)) == pytest.approx([-0.005, 0.0, 0.0025])
-    assert list(particle.out_of_crowd(crowd, 0.5, 0.0)) == [0.0, 0.0, 0.0]
-    assert list(particle.out_of_crowd(crowd, 0.5, 1e9)) == pytest.approx([-0.1, 0.0, 0.05])  # no farther
+    assert list(out_of_crowd(crowd, 0.5, 0.01)) == pytest.approx([-0.005, 0.0, 0.0025])
+    assert list(out_of_crowd(crowd, 0.5, 0.0)) == [0.0, 0.0, 0.0]
+    assert list(out_of_crowd(crowd, 0.5, 1e9)) == pytest.approx([-0.1, 0.0, 0.05])  # no farther
 
 
 PASTE = {"yield_stress": 1e-6}

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 from fluidbench.native.scene import FRICTION, PERIODIC, SLIP, STICK, Box
-from solvers import neighbours
+from solvers import cells, neighbours
 from solvers.corrected import mirrored_stress
 from solvers.images import (
     contained,
@@ -172,8 +172,8 @@ def test_few_particles_are_shared_by_more_threads_as_long_as_each_has_enough_to_
 
 
 def test_a_grid_of_cells_covers_the_domain_or_repeats_itself():
-    assert neighbours.sides_for([1.0, 6.0, 14.0], 10**6) == [4, 8, 16] and neighbours.sides_for([14.1], 10**6) == [32]
-    assert neighbours.sides_for([1000.0, 1000.0, 3.0], 1000) == [8, 16, 8] and neighbours.sides_for([1e6] * 3, 1) == [
+    assert cells.sides_for([1.0, 6.0, 14.0], 10**6) == [4, 8, 16] and cells.sides_for([14.1], 10**6) == [32]
+    assert cells.sides_for([1000.0, 1000.0, 3.0], 1000) == [8, 16, 8] and cells.sides_for([1e6] * 3, 1) == [
         4,
         4,
         4,

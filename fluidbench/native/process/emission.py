@@ -20,12 +20,12 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Pipe:
-    """The stream on the device; a particle's row and its offset follow from its number in the stream."""
+    """The stream on the device; a particle's row follows from its number in the stream."""
 
     first_origin: int
     points: int  # of a row
     volume: float
-    offsets: wp.array(dtype=wp.vec2)  # of the points of a row, or of each row
+    offsets: wp.array(dtype=wp.vec2)  # of each particle about the axis
     speed: wp.array(dtype=float)  # [m/s]
     extruding: wp.array(dtype=float)
     release_time: wp.array(dtype=float)
@@ -37,7 +37,7 @@ class Pipe:
 @wp.func
 def inside_nozzle(pipe: Pipe, number: int, hours: Hours, row: int):
     """Where particle `number` of the stream is at the hour of a row."""
-    offset = pipe.offsets[number % pipe.offsets.shape[0]]
+    offset = pipe.offsets[number]
     line = number / pipe.points
     rise = pipe.speed[line] * (pipe.extruding[line] - hours.extruded[row])
     return hours.exit[row] + wp.vec3(offset[0], offset[1], rise)
@@ -104,7 +104,7 @@ def push(
     if i % capacity < count[i / capacity] and held[i] == CARRIED:
         number = origin[i] - pipe.first_origin
         layer = number / pipe.points
-        offset = pipe.offsets[number % pipe.offsets.shape[0]]
+        offset = pipe.offsets[number]
         late = hours.time[row] - pipe.release_time[layer]
         if late >= 0.0:
             held[i] = FREE

@@ -1,0 +1,46 @@
+"""What moves particles apart that have come together, without a push: the shifting of Lind et al. (2012), by the
+tensile control of Monaghan (2000) alone. Of SPH and MPM.
+
+    crowd_i = sum_j V_j grad W (W^4 / W(r0)^4 - 1)   over partners nearer than r0 = 0.9 d  [1/m]
+    shift_i = -(strain x constant) h^2 crowd_i                                             [m]
+
+Partners push each other alike where both shear alike; a lattice and its free surface feel nothing; what rests, flies or
+turns does not shear.
+"""
+
+import warp as wp
+
+from .bind import warp_func
+from .smoothing import wendland, wendland_slope
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+CLOSE = 0.9  # r0: distance below which particles are moved apart, in spacings
+FARTHEST = wp.constant(0.2)  # of h^2 crowd, at a time: beyond it partners would change places
+
+kernel = warp_func(wendland)
+
+
+def nearest(d: float, h: float) -> float:
+    """W(r0) [1/m^3] of particles d [m] apart at rest, with smoothing length h [m]."""
+    return wendland(CLOSE * d / h, h)
+
+
+def crowding(r: float, d: float, h: float) -> float:
+    """How much one partner at a distance r [m] crowds a particle [1/m]."""
+    excess = (wendland(r / h, h) / nearest(d, h)) ** 4 - 1.0
+    return d**3 * -wendland_slope(r / h, h) * r * excess
+
+
+@wp.func
+def excess(r: float, h: float, near: float):
+    """W^4 / W(r0)^4 - 1 of a partner at a distance r [m], 0 beyond r0; `near` is W(r0)."""
+    ratio = kernel(r / h, h) / near
+    ratio *= ratio
+    return wp.max(ratio * ratio - 1.0, 0.0)
+
+
+@wp.func
+def out_of_crowd(crowd: wp.vec3, h: float, strain: float):
+    """How far a particle is shifted [m] while matter shears by `strain` times the constant: -strain h^2 crowd."""
+    return -(wp.min(strain, FARTHEST) * h * h) * crowd

@@ -1,0 +1,233 @@
+"""MPM's particles kept apart: what the grid cannot see, a pair of them within a cell, is undone by pairs.
+
+Where matter is sheared, particles that a grid carries along come as near to each other as they like: no stress resists
+what has no velocity gradient. They line up in threads with gaps between, and what is measured finer than a cell finds
+less matter than there is. So every few ticks, where matter flows, pairs nearer than 0.9 spacings leave each other as in
+SPH (../crowding.py), in proportion to the strain meanwhile. What the grid does see of these shifts, their mean over its
+nodes, is taken off again: it would widen whatever is strained (a flattened drop by 6 % of its radius), for no volume
+ratio knows of it; so the momentum of no node is changed but by how the field bends within a cell.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from fluidbench.method.frame import FREE
+from fluidbench.native.crew import index_of
+from fluidbench.native.pool import Pool
+from fluidbench.native.scene import Box, Phase, Scene
+
+from ..backends import Warp
+from ..bind import warp_func
+from ..cells import Cells, WhoIsWhere, bucket_of, cell_of, place
+from ..crowding import CLOSE, excess, nearest, out_of_crowd
+from ..flow import advanced, shear_rate, threshold_of
+from ..images import has_choice, image_position, near_faces, opposite
+from ..search import around
+from ..smoothing import wendland_slope
+from .grid import Grid, activate_stencil, first_node, node_at
+from .homes import on_grid
+from .particle import contained, weights
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+EVERY = 4  # ticks: in each matter goes a quarter of a spacing at most
+KERNEL = 1.5  # smoothing length of the crowding, in spacings
+LONGEST = wp.constant(0.25)  # shift at a time, in spacings: as far as matter goes in a tick
+
+slope = warp_func(wendland_slope)
+
+
+@wp.struct
+class Apart:
+    """Numbers of the crowding."""
+
+    h: float  # smoothing length [m]
+    near: float  # kernel at the distance below which partners crowd each other [1/m^3]
+    strain: float  # shift over the rate of shear and h^2 crowding [s]
+
+
+@wp.func
+def crowd_through(
+    num: Apart, box: Box, cells: Cells, world: int, i: int, x: wp.vec3, code: int, volume: wp.array(dtype=float)
+):
+    """What the images of all others by the shift of this code, or they themselves (0), add to the crowding of particle
+    i at x."""
+    at = image_position(box, x, opposite(code))  # where it sees others as it sees their images from x
+    middle = cell_of(at, cells.width)
+    crowd = wp.vec3(0.0, 0.0, 0.0)
+    for c in range(27):
+        bucket = bucket_of(cells, world, around(middle, c))
+        start = cells.start[bucket]
+        for m in range(start, start + cells.number[bucket]):
+            r = at - place(cells.spot[m])
+            length = wp.length(r)
+            if length < cells.width and (code > 0 or cells.members[m] != i):
+                share = excess(length, num.h, num.near) * volume[cells.members[m]]
+                crowd += (slope(length / num.h, num.h) * share) * r
+    return crowd
+
+
+@wp.kernel
+def separate(
+    share: wp.vec3i,
+    num: Apart,
+    box: Box,
+    cells: Cells,
+    capacity: int,
+    count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    volume: wp.array(dtype=float),
+    affine: wp.array(dtype=wp.mat33),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+    plastic: wp.array(dtype=float),
+    dt: wp.array(dtype=float),
+    # outputs
+    shift: wp.array(dtype=wp.vec3),
+):
+    """How far each particle is to be shifted [m]: if it is a liquid's, or would flow in a step as it is."""
+    i = index_of(share, wp.tid())
+    world = i / capacity
+    if i - world * capacity < count[world]:
+        by = wp.vec3(0.0, 0.0, 0.0)
+        phase = phases[world, phase_of[i]]
+        flows = phase.shear_modulus <= 0.0 or phase.relaxation_rate > 0.0
+        if not flows:
+            limit = threshold_of(phase, i, plastic)
+            _b, _s, kept = advanced(
+                phase, phase.shear_modulus, limit, affine[i], elastic_normal[i], elastic_shear[i], dt[world]
+            )
+            flows = kept < 1.0
+        if held[i] == FREE and flows:
+            x = position[i]
+            near = near_faces(box, x, cells.width, True)
+            codes = int(1)
+            if near[0] + near[1] + near[2] > 12:
+                codes = 27
+            crowd = wp.vec3(0.0, 0.0, 0.0)
+            for code in range(codes):
+                if has_choice(near, code):
+                    crowd += crowd_through(num, box, cells, world, i, x, code, volume)
+            by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]))
+        shift[i] = by
+
+
+@wp.kernel
+def spread(
+    grid: Grid,
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    shift: wp.array(dtype=wp.vec3),
+    table: wp.array(dtype=int),
+    # outputs
+    nodes: wp.array(dtype=wp.vec4),
+):
+    """(sum of w m shift, sum of w m) to nodes, which are empty."""
+    p = wp.tid()
+    world = p / capacity
+    if p - world * capacity < count[world]:
+        base = first_node(grid, position[p])
+        _f, wx, wy, wz = weights(grid, position[p], base)
+        by = mass[p] * shift[p]
+        row = wp.vec4(by[0], by[1], by[2], mass[p])
+        for o in range(3):
+            for q in range(3):
+                for r in range(3):
+                    at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
+                    if at >= 0:
+                        wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * row)
+
+
+@wp.kernel
+def part(
+    share: wp.vec3i,
+    grid: Grid,
+    spacing: float,
+    capacity: int,
+    count: wp.array(dtype=int),
+    held: wp.array(dtype=int),
+    shift: wp.array(dtype=wp.vec3),
+    nodes: wp.array(dtype=wp.vec4),
+    # outputs
+    position: wp.array(dtype=wp.vec3),
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int),
+    homes: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
+    """Shift each free particle by what its nodes do not see, among active nodes."""
+    p = index_of(share, wp.tid())
+    world = p / capacity
+    if p - world * capacity < count[world] and held[p] == FREE:
+        x = position[p]
+        base = first_node(grid, x)
+        _f, wx, wy, wz = weights(grid, x, base)
+        by = shift[p]
+        for o in range(3):
+            for q in range(3):
+                for r in range(3):
+                    at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
+                    if at >= 0 and nodes[at][3] > 0.0:
+                        seen = wp.vec3(nodes[at][0], nodes[at][1], nodes[at][2])
+                        by -= (wx[o] * wy[q] * wz[r] / nodes[at][3]) * seen
+        by *= wp.min(1.0, LONGEST * spacing / wp.max(wp.length(by), 1.0e-12))
+        if wp.length(by) > 0.0:
+            position[p] = contained(grid, x + by)
+            after = first_node(grid, position[p])
+            if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
+                activate_stencil(grid, world, after, table, block_of, active, fault)
+                homes[0] = 1
+
+
+class Separation:
+    """What separating allocates, and its launches, which are Warp's whatever the solver's language."""
+
+    def __init__(self, scene: Scene, pool: Pool, grid: Grid, plastic: wp.array, constant: float) -> None:
+        """`plastic`: strains, see flow.py; `constant`: shift over strain and h^2 crowding [-]."""
+        self.scene, self.pool, self.grid = scene, pool, grid
+        self.elastic = [pool.elastic_normal, pool.elastic_shear, plastic]
+        num = self.num = Apart()
+        num.h = KERNEL * scene.spacing
+        num.near = nearest(scene.spacing, num.h)
+        num.strain = constant * EVERY * scene.clock.tick
+        with wp.ScopedDevice(scene.device):
+            self.shift = wp.zeros(pool.size, dtype=wp.vec3)
+            self._nobody = wp.zeros(1, dtype=int)
+        self.who = WhoIsWhere(scene, pool, CLOSE * scene.spacing)
+        self.backend = Warp(scene.crew)
+
+    def prepare(self) -> None:
+        self.who.prepare()
+        self.scene.crew.load(__name__)
+
+    def part(self, table: wp.array, block_of: wp.array, active: wp.array, nodes: wp.array, homes: Any) -> None:
+        """Enqueue: move apart who is too near, by way of `nodes`, which are empty."""
+        pool, scene, launch = self.pool, self.scene, self.backend.launch
+        some = [pool.capacity, pool.count]
+        matter = [pool.phase, pool.held, pool.position, pool.volume, pool.affine, *self.elastic, scene.dt]
+        self.who.tell(self.backend)
+        launch(separate, pool.size, [self.num, scene.box, self.who.cells, *some, scene.phases, *matter], [self.shift])
+        launch(spread, pool.size, [self.grid, *some, pool.position, pool.mass, self.shift, table], [nodes])
+        launch(
+            part,
+            pool.size,
+            [self.grid, scene.spacing, *some, pool.held, self.shift, nodes],
+            [
+                pool.position,
+                table,
+                block_of,
+                active,
+                self._nobody if homes is None else homes.outdated,
+                pool.fault,
+            ],
+        )
+
+    def footprint(self) -> dict[str, int]:
+        return {"separation": self.shift.capacity + self.who.footprint()}
