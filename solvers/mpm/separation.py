@@ -5,7 +5,7 @@ what has no velocity gradient. They line up in threads with gaps between, and wh
 less matter than there is. So every few ticks, where matter flows, pairs nearer than 0.9 spacings leave each other as in
 SPH (../crowding.py), in proportion to the strain meanwhile. What the grid does see of these shifts, their mean over its
 nodes, is taken off again: it would widen whatever is strained (a flattened drop by 6 % of its radius), for no volume
-ratio knows of it; so the momentum of no node is changed but by how the field bends within a cell.
+ratio knows of it. Velocities stay: the momentum of nodes is changed by no more than how the field bends within a cell.
 """
 
 from typing import Any
@@ -25,7 +25,7 @@ from ..flow import advanced, shear_rate, threshold_of
 from ..images import has_choice, image_position, near_faces, opposite
 from ..search import around
 from ..smoothing import wendland_slope
-from .grid import Grid, activate_stencil, first_node, node_at
+from .grid import Grid, activate_stencil, clear_grid, first_node, node_at
 from .homes import on_grid
 from .particle import contained, weights
 
@@ -87,13 +87,14 @@ def separate(
     plastic: wp.array(dtype=float),
     dt: wp.array(dtype=float),
     # outputs
-    shift: wp.array(dtype=wp.vec3),
+    shift: wp.array(dtype=wp.vec4),
 ):
-    """How far each particle is to be shifted [m]: if it is a liquid's, or would flow in a step as it is."""
+    """How far each particle is to be shifted [m], and 1 if it takes part: if it is a liquid's, or would flow in a step
+    as it is."""
     i = index_of(share, wp.tid())
     world = i / capacity
     if i - world * capacity < count[world]:
-        by = wp.vec3(0.0, 0.0, 0.0)
+        found = wp.vec4(0.0, 0.0, 0.0, 0.0)
         phase = phases[world, phase_of[i]]
         flows = phase.shear_modulus <= 0.0 or phase.relaxation_rate > 0.0
         if not flows:
@@ -113,7 +114,8 @@ def separate(
                 if has_choice(near, code):
                     crowd += crowd_through(num, box, cells, world, i, x, code, volume)
             by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]))
-        shift[i] = by
+            found = wp.vec4(by[0], by[1], by[2], 1.0)
+        shift[i] = found
 
 
 @wp.kernel
@@ -123,19 +125,18 @@ def spread(
     count: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
     mass: wp.array(dtype=float),
-    shift: wp.array(dtype=wp.vec3),
+    shift: wp.array(dtype=wp.vec4),
     table: wp.array(dtype=int),
     # outputs
     nodes: wp.array(dtype=wp.vec4),
 ):
-    """(sum of w m shift, sum of w m) to nodes, which are empty."""
+    """(sum of w m shift, sum of w m) of those that take part to nodes, which are empty."""
     p = wp.tid()
     world = p / capacity
-    if p - world * capacity < count[world]:
+    if p - world * capacity < count[world] and shift[p][3] > 0.0:
         base = first_node(grid, position[p])
         _f, wx, wy, wz = weights(grid, position[p], base)
-        by = mass[p] * shift[p]
-        row = wp.vec4(by[0], by[1], by[2], mass[p])
+        row = mass[p] * shift[p]
         for o in range(3):
             for q in range(3):
                 for r in range(3):
@@ -145,14 +146,13 @@ def spread(
 
 
 @wp.kernel
-def part(
+def shift_apart(
     share: wp.vec3i,
     grid: Grid,
     spacing: float,
     capacity: int,
     count: wp.array(dtype=int),
-    held: wp.array(dtype=int),
-    shift: wp.array(dtype=wp.vec3),
+    shift: wp.array(dtype=wp.vec4),
     nodes: wp.array(dtype=wp.vec4),
     # outputs
     position: wp.array(dtype=wp.vec3),
@@ -162,14 +162,14 @@ def part(
     homes: wp.array(dtype=int),
     fault: wp.array(dtype=int),
 ):
-    """Shift each free particle by what its nodes do not see, among active nodes."""
+    """Shift each particle that takes part by what its nodes do not see, among active nodes."""
     p = index_of(share, wp.tid())
     world = p / capacity
-    if p - world * capacity < count[world] and held[p] == FREE:
+    if p - world * capacity < count[world] and shift[p][3] > 0.0:
         x = position[p]
         base = first_node(grid, x)
         _f, wx, wy, wz = weights(grid, x, base)
-        by = shift[p]
+        by = wp.vec3(shift[p][0], shift[p][1], shift[p][2])
         for o in range(3):
             for q in range(3):
                 for r in range(3):
@@ -198,27 +198,31 @@ class Separation:
         num.near = nearest(scene.spacing, num.h)
         num.strain = constant * EVERY * scene.clock.tick
         with wp.ScopedDevice(scene.device):
-            self.shift = wp.zeros(pool.size, dtype=wp.vec3)
+            self.shift = wp.zeros(pool.size, dtype=wp.vec4)
             self._nobody = wp.zeros(1, dtype=int)
         self.who = WhoIsWhere(scene, pool, CLOSE * scene.spacing)
         self.backend = Warp(scene.crew)
 
     def prepare(self) -> None:
         self.who.prepare()
-        self.scene.crew.load(__name__)
+        for module in (__name__, clear_grid.module):
+            self.scene.crew.load(module)
 
-    def part(self, table: wp.array, block_of: wp.array, active: wp.array, nodes: wp.array, homes: Any) -> None:
-        """Enqueue: move apart who is too near, by way of `nodes`, which are empty."""
+    def part(
+        self, table: wp.array, block_of: wp.array, active: wp.array, nodes: wp.array, lanes: int, homes: Any
+    ) -> None:
+        """Enqueue: move apart who is too near, by way of `nodes`; `lanes` are the threads that empty them."""
         pool, scene, launch = self.pool, self.scene, self.backend.launch
         some = [pool.capacity, pool.count]
         matter = [pool.phase, pool.held, pool.position, pool.volume, pool.affine, *self.elastic, scene.dt]
         self.who.tell(self.backend)
         launch(separate, pool.size, [self.num, scene.box, self.who.cells, *some, scene.phases, *matter], [self.shift])
+        launch(clear_grid, lanes, [active, lanes], [nodes])
         launch(spread, pool.size, [self.grid, *some, pool.position, pool.mass, self.shift, table], [nodes])
         launch(
-            part,
+            shift_apart,
             pool.size,
-            [self.grid, scene.spacing, *some, pool.held, self.shift, nodes],
+            [self.grid, scene.spacing, *some, self.shift, nodes],
             [
                 pool.position,
                 table,

@@ -227,9 +227,8 @@ class SolverMPM(Solver):
 
     def arrange(self) -> None:
         assert self.separation is not None
-        self.empty(self.raw)
         homes = None if self.by_block is None else self.by_block.homes
-        self.separation.part(self.table, self.block_of, self.active, self.raw, homes)
+        self.separation.part(self.table, self.block_of, self.active, self.raw, self.node_lanes, homes)
 
     def substep(self) -> None:
         if self.scene.grows:

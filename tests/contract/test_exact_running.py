@@ -242,6 +242,31 @@ def test_launches_are_captured_or_waited_for():
     assert list(captured.scene.crew.graphs) == ["audit", 1, (True, False, False, False)]
 
 
+@pytest.mark.parametrize("graphs", [True, False])
+def test_particles_are_arranged_every_so_many_ticks_of_the_run(graphs):
+    """At ticks 0, 3, 6; and a run that goes on at tick 4 does it next at 6."""
+
+    class Arranging(Stepping):
+        dt, arranges = 9.0, 3
+
+        def arrange(self):
+            self.pool.birth_time.fill_(7.0)
+
+    def arranged(done, until):
+        sim, at = Simulation(scenario(**FALLING), Arranging, graphs=graphs), []
+        sim.prepare()
+        sim.begin()
+        sim.done = done
+        while sim.done < until:
+            sim.pool.birth_time.fill_(0.0)
+            sim.advance_tick()
+            if sim.pool.birth_time.numpy()[0] == 7.0:
+                at.append(sim.done - 1)
+        return at
+
+    assert arranged(0, 8) == [0, 3, 6] and arranged(4, 8) == [6]
+
+
 def test_layers_come_at_their_time_and_carry_no_spin():
     body = FALLING["bodies"][0]
     later = body | {"center": [0.2, 0.2, 0.9], "start": 0.5}
