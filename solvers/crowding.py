@@ -28,8 +28,7 @@ def nearest(d: float, h: float) -> float:
 
 def crowding(r: float, d: float, h: float) -> float:
     """How much one partner at a distance r [m] crowds a particle [1/m]."""
-    excess = (wendland(r / h, h) / nearest(d, h)) ** 4 - 1.0
-    return d**3 * -wendland_slope(r / h, h) * r * excess
+    return d**3 * -wendland_slope(r / h, h) * r * ((wendland(r / h, h) / nearest(d, h)) ** 4 - 1.0)
 
 
 @wp.func

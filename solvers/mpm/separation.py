@@ -25,14 +25,14 @@ from ..flow import advanced, shear_rate, threshold_of
 from ..images import has_choice, image_position, near_faces, opposite
 from ..search import around
 from ..smoothing import wendland_slope
-from .grid import Grid, activate_stencil, clear_grid, first_node, node_at
-from .homes import on_grid
-from .particle import contained, weights
+from .grid import Grid, clear_grid
+from .nodes import follow, mean_of_nodes, tell_nodes
+from .particle import contained
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 EVERY = 4  # ticks: in each matter goes a quarter of a spacing at most
-KERNEL = 1.5  # smoothing length of the crowding, in spacings
+KERNEL = 1.5  # smoothing length of the crowding, in spacings: SPH's in matter that lies in no order
 LONGEST = wp.constant(0.25)  # shift at a time, in spacings: as far as matter goes in a tick
 
 slope = warp_func(wendland_slope)
@@ -134,15 +134,7 @@ def spread(
     p = wp.tid()
     world = p / capacity
     if p - world * capacity < count[world] and shift[p][3] > 0.0:
-        base = first_node(grid, position[p])
-        _f, wx, wy, wz = weights(grid, position[p], base)
-        row = mass[p] * shift[p]
-        for o in range(3):
-            for q in range(3):
-                for r in range(3):
-                    at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
-                    if at >= 0:
-                        wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * row)
+        tell_nodes(grid, world, position[p], mass[p] * shift[p], table, nodes)
 
 
 @wp.kernel
@@ -167,23 +159,11 @@ def shift_apart(
     world = p / capacity
     if p - world * capacity < count[world] and shift[p][3] > 0.0:
         x = position[p]
-        base = first_node(grid, x)
-        _f, wx, wy, wz = weights(grid, x, base)
-        by = wp.vec3(shift[p][0], shift[p][1], shift[p][2])
-        for o in range(3):
-            for q in range(3):
-                for r in range(3):
-                    at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
-                    if at >= 0 and nodes[at][3] > 0.0:
-                        seen = wp.vec3(nodes[at][0], nodes[at][1], nodes[at][2])
-                        by -= (wx[o] * wy[q] * wz[r] / nodes[at][3]) * seen
+        by = wp.vec3(shift[p][0], shift[p][1], shift[p][2]) - mean_of_nodes(grid, world, x, table, nodes)
         by *= wp.min(1.0, LONGEST * spacing / wp.max(wp.length(by), 1.0e-12))
         if wp.length(by) > 0.0:
             position[p] = contained(grid, x + by)
-            after = first_node(grid, position[p])
-            if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
-                activate_stencil(grid, world, after, table, block_of, active, fault)
-                homes[0] = 1
+            follow(grid, world, x, position[p], table, block_of, active, homes, fault)
 
 
 class Separation:

@@ -26,7 +26,8 @@ from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Phase, Scene
 
 from ..tool import Tool, mirrored, outside, table_of, tool_of
-from .grid import Grid, activate_stencil, first_node, node_at
+from .grid import Grid, first_node, node_at
+from .nodes import follow, mean_of_nodes, tell_nodes
 from .particle import PRESSED, columns_scaled, inertia, kirchhoff, resistance_of, viscous, weights
 
 wp.set_module_options({"enable_backward": False})
@@ -109,12 +110,9 @@ def keep_out(
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world] and held[p] == FREE:
-        before = first_node(grid, position[p])
-        position[p] = outside(tool, position[p])
-        after = first_node(grid, position[p])
-        if after[0] != before[0] or after[1] != before[1] or after[2] != before[2]:
-            activate_stencil(grid, world, after, table, block_of, active, fault)
-            homes[0] = 1
+        before = position[p]
+        position[p] = outside(tool, before)
+        follow(grid, world, before, position[p], table, block_of, active, homes, fault)
 
 
 @wp.kernel
@@ -129,20 +127,12 @@ def spread(
     # outputs
     nodes: wp.array(dtype=wp.vec4),
 ):
-    """(sum of w V0 J, sum of w V0) to nodes."""
+    """(sum of w V0 J, -, -, sum of w V0) to nodes."""
     p = wp.tid()
     world = p / capacity
     if p - world * capacity < count[world]:
-        x = position[p]
-        base = first_node(grid, x)
-        _f, wx, wy, wz = weights(grid, x, base)
-        for o in range(3):
-            for q in range(3):
-                for r in range(3):
-                    at = node_at(grid, world, wp.vec3i(base[0] + o, base[1] + q, base[2] + r), table)
-                    if at >= 0:
-                        w = wx[o] * wy[q] * wz[r] * volume[p]
-                        wp.atomic_add(nodes, at, wp.vec4(w * volume_ratio[p], w, 0.0, 0.0))
+        row = volume[p] * wp.vec4(volume_ratio[p], 0.0, 0.0, 1.0)
+        tell_nodes(grid, world, position[p], row, table, nodes)
 
 
 @wp.kernel
@@ -164,16 +154,7 @@ def level(
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
-        x = position[p]
-        base = first_node(grid, x)
-        _f, wx, wy, wz = weights(grid, x, base)
-        mean = float(0.0)
-        for o in range(3):
-            for q in range(3):
-                for r in range(3):
-                    at = node_at(grid, world, wp.vec3i(base[0] + o, base[1] + q, base[2] + r), table)
-                    if at >= 0 and nodes[at][1] > 0.0:
-                        mean += wx[o] * wy[q] * wz[r] * nodes[at][0] / nodes[at][1]
+        mean = mean_of_nodes(grid, world, position[p], table, nodes)[0]
         part = DIFFUSION * dt[world] * phases[world, phase_of[p]].wave_speed * grid.inv_dx[0]
         volume_ratio[p] = volume_ratio[p] + wp.min(part, 1.0) * (mean - volume_ratio[p])
 

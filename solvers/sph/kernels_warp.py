@@ -33,13 +33,12 @@ from ..flow import pressure, shear_rate, strained
 from ..hourglass import off_linear
 from ..images import WALL_INSET, contained, image_gradient, image_traction, image_velocity
 from ..pairs import Pass, floats
-from ..smoothing import wendland, wendland_slope
+from ..smoothing import wendland_slope
 from ..tool import Tool, felt, keep_out, seen_by_tool
 from .particle import Smoothing, broken, drifted, pulled_back, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-kernel = warp_func(wendland)
 slope = warp_func(wendland_slope)
 
 FLOOR = wp.constant(0.1)  # least density over that at rest

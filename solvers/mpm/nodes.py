@@ -1,0 +1,60 @@
+"""What particles tell the nodes of MPM's grid beside their momentum, and hear from them: one particle at a time, as for
+passes that are rare or small. (Momentum goes faster: patches.py, together.py.)"""
+
+import warp as wp
+
+from .grid import Grid, activate_stencil, first_node, node_at
+from .homes import on_grid
+from .particle import weights
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+
+@wp.func
+def tell_nodes(
+    grid: Grid, world: int, x: wp.vec3, row: wp.vec4, table: wp.array(dtype=int), nodes: wp.array(dtype=wp.vec4)
+):
+    """Add w row to the active ones of the 27 nodes around x."""
+    base = first_node(grid, x)
+    _f, wx, wy, wz = weights(grid, x, base)
+    for o in range(3):
+        for q in range(3):
+            for r in range(3):
+                at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
+                if at >= 0:
+                    wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * row)
+
+
+@wp.func
+def mean_of_nodes(grid: Grid, world: int, x: wp.vec3, table: wp.array(dtype=int), nodes: wp.array(dtype=wp.vec4)):
+    """The mean at x of what nodes were told in three components; the fourth is its weight."""
+    base = first_node(grid, x)
+    _f, wx, wy, wz = weights(grid, x, base)
+    mean = wp.vec3(0.0, 0.0, 0.0)
+    for o in range(3):
+        for q in range(3):
+            for r in range(3):
+                at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
+                if at >= 0 and nodes[at][3] > 0.0:
+                    share = wx[o] * wy[q] * wz[r] / nodes[at][3]
+                    mean += share * wp.vec3(nodes[at][0], nodes[at][1], nodes[at][2])
+    return mean
+
+
+@wp.func
+def follow(
+    grid: Grid,
+    world: int,
+    before: wp.vec3,
+    after: wp.vec3,
+    table: wp.array(dtype=int),
+    block_of: wp.array(dtype=int),
+    active: wp.array(dtype=int),
+    outdated: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
+    """Activate the nodes around a particle that was moved between two substeps; homes are outdated then."""
+    old, new = first_node(grid, before), first_node(grid, after)
+    if new[0] != old[0] or new[1] != old[1] or new[2] != old[2]:
+        activate_stencil(grid, world, new, table, block_of, active, fault)
+        outdated[0] = 1
