@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..report.page import anchor
 from ..report.report import Detail, Report, machine_of
 from ..report.table import Link, Table
+from ..runs.archive import of_other_code
 from ..study.validate_report import work_precision
 from . import PAPER
 from .cells import Cell
@@ -49,6 +50,7 @@ def report(studies: Studies, root: Path) -> Report:
     found = gathered(studies)
     counts = Counter(verdict(place) for place in found)
     findings = [f"Of {len(found)} statements " + ", ".join(f"{n} {WORDS[v]}" for v, n in counts.items()) + "."]
+    findings += of_other_code({label: e.sweeps() for label, e in studies.items()})
     findings += repeated(found)
     findings += [sentence(place) for place in found if verdict(place) in (OPEN, DEPENDS, LOOSE)]
     scenario = next(iter(studies.values())).scenario.name

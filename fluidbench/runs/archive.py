@@ -4,7 +4,7 @@ again, elsewhere and later."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,22 @@ def where(runs: Iterable[Run]) -> str:
     device = next((r.machine["device"] for r in records if "device" in r.machine), asked)
     backend = next((r.backend for r in records), DEFAULT_BACKEND)
     return device + f", {backend}" * (backend != DEFAULT_BACKEND)
+
+
+def of_other_code(studies: Mapping[str, Iterable[Run]]) -> list[str]:
+    """A line for each study, by its label, that other sources made than the newest: where they differ, that may be
+    why."""
+    made = {
+        label: ({r.code.get("sources", "") for r in records}, max(r.machine.get("time", "") for r in records)[:10])
+        for label, runs in studies.items()
+        if (records := [run.record for run in runs])
+    }
+    newest = max(made, key=lambda label: made[label][1], default="")
+    return [
+        f"{label} ({day}) was made by other code than {newest} ({made[newest][1]}): what differs may differ for that."
+        for label, (sources, day) in made.items()
+        if sources != made[newest][0]
+    ]
 
 
 def places(folder: Path, name: str, verb: str) -> list[Path]:

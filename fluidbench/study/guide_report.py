@@ -9,6 +9,7 @@ from typing import Any
 
 from ..report.report import Detail, Image, Report, machine_of
 from ..report.table import Table
+from ..runs.archive import of_other_code
 from .again import command_of
 from .choice import Choice, choices, setting, time_of
 from .guide_chart import SURE, chart
@@ -31,6 +32,7 @@ def report(studies: Studies, tolerances: Sequence[float], root: Path, missing: S
     found = choices(studies, tolerances)
     shown = _table(found, list(studies), tolerances)
     findings = [sentence(studies, found, job) for job in dict.fromkeys(c.job for c in found)]
+    findings += of_other_code({m: [r for s in jobs.values() for r in s.runs] for m, jobs in studies.items()})
     details = [_detail(studies, found, job, root) for job in dict.fromkeys(c.job for c in found)]
     made = [f"{machine}: {machine_of(r for s in jobs.values() for r in s.runs)}" for machine, jobs in studies.items()]
     title = "Which method for what, by tolerance"

@@ -28,7 +28,7 @@ from ..method.verdict import lacking
 from ..runs.record import Run
 from ..scenario import Scenario
 from ..scenario.measured import Measured
-from .fit import Fit, extrapolate
+from .fit import NOISE, Fit, extrapolate
 from .lengths import lengths_of
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
@@ -104,10 +104,13 @@ class Selection:
         return float(np.polyfit(np.log([c.spacing for c in own]), np.log([c.discretisation for c in own]), 1)[0])
 
     def converges(self, method: str) -> bool:
-        """Whether a method's error falls as it is refined: in all, and at the finest spacing once more."""
+        """Whether a method's error falls as it is refined, in all, and at the finest spacing once more; or was never
+        more than noise."""
         own = sorted((c for c in self.candidates if c.method == method), key=lambda c: c.spacing)
         if len(own) < ENOUGH:
             return False
+        if all(c.discretisation <= NOISE for c in own):
+            return method not in self.erratic
         falling = own[0].discretisation <= own[1].discretisation * (1.0 + 1e-9)
         return falling and method not in self.erratic and (own[0].discretisation == 0 or self.order(method) > FALLS)
 

@@ -176,6 +176,8 @@ def test_order_is_the_slope_of_the_errors_that_are_not_nothing():
         ((0.02, 0.0284, 0.0403), True),  # of order 0.505
         ((0.0, 0.02, 0.01), True),
         ((0.01, 0.02), False),
+        ((0.01, 0.002, 0.002), True),  # noise all along
+        ((0.011, 0.002, 0.002), False),
     ],
 )
 def test_a_method_converges_when_its_error_falls_at_half_an_order(errors, converges):
