@@ -1,17 +1,16 @@
-"""The material point method: allocation, bounds and the order of passes."""
+"""The material point method: allocation and the order of passes."""
 
 import math
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from pydantic import Field
 
-from fluidbench.method.contract import Config, Economy, NumericalAxis
+from fluidbench.method.contract import Economy, NumericalAxis
 from fluidbench.method.features import Feature
 from fluidbench.method.target import BACKENDS
-from fluidbench.method.timestep import Bound, damped_limit
+from fluidbench.method.timestep import Bound
 from fluidbench.native.crew import put
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
@@ -26,10 +25,12 @@ from ..flow import plastic_strains
 from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
 from ..theory import mpm_numbers, stable_dt
-from ..viscosity import Scheme, Tolerance, accuracy, decided
+from ..viscosity import decided
 from . import kernels_warp as kernels
+from .bounds import bounds_of
 from .by_block import ByBlock
-from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, cells_of, grid_of
+from .config import ConfigMPM
+from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, grid_of
 from .implicit import GridViscosity
 from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
 from .piston import piston_of
@@ -38,26 +39,7 @@ from .separation import EVERY, Separation
 from .tool import Held
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
-ISOLATED_ACOUSTIC = 1.0 / math.sqrt(3.0)
-ISOLATED_VISCOUS = 0.25
 WORTH = 16.0  # times the substeps that explicit viscosity may take before implicit is cheaper, see physics.md
-
-
-class ConfigMPM(Config):
-    grid_ratio: Annotated[float, Field(ge=1.0, le=4.0)] = Field(2.0, description="grid spacing over particle spacing")
-    safety: Annotated[float, Field(gt=0, le=1.0)] = Field(0.8, description="share of the exact stability limit used")
-    advection: Annotated[float, Field(gt=0, lt=1.0)] = Field(0.5, description="cells that matter may cross in a step")
-    shifting: Annotated[float, Field(ge=0)] = Field(
-        8.0, description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2"
-    )
-    separation: Annotated[float, Field(ge=0)] = Field(
-        0.5, description="shift of particles that are too near each other, over strain and crowding"
-    )
-    viscosity: Scheme = Field(
-        "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
-    )
-    viscous_tolerance: Tolerance = 1e-4
-    blocks_per_particle: Annotated[float, Field(gt=0, le=8)] = Field(0.5, description="grid blocks to preallocate")
 
 
 class SolverMPM(Solver):
@@ -124,31 +106,7 @@ class SolverMPM(Solver):
 
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        dx = float(cells_of(scenario.domain, config.grid_ratio * scenario.spacing)[1].min())
-        acoustic = ISOLATED_ACOUSTIC * dx / (scenario.wave_speed + speed)
-        implicit = config.viscosity == "implicit"
-        nu = 0.0 if implicit else scenario.material.viscosity / scenario.material.density
-        viscous = ISOLATED_VISCOUS * dx * dx / nu if nu > 0 else math.inf
-        a = config.safety
-        limits = [
-            Bound(
-                "acoustic", a * acoustic, f"{a:g} dx / (sqrt(3) (c + v))", "references.md, H: isolated particle, exact"
-            ),
-            Bound("advective", config.advection * dx / max(speed, 1e-12), f"{config.advection:g} dx / v", "one cell"),
-        ]
-        if implicit and scenario.material.viscosity > 0:
-            limits.append(accuracy(scenario))
-        if nu > 0:
-            limits += [
-                Bound("viscous", a * viscous, f"{a:g} dx^2 / (4 nu)", "references.md, H: isolated particle, exact"),
-                Bound(
-                    "acoustic-viscous",
-                    a * damped_limit(acoustic, viscous),
-                    "(dt/dt_acoustic)^2 + dt/dt_viscous < 1",
-                    "symplectic Euler of a damped oscillator",
-                ),
-            ]
-        return limits
+        return bounds_of(scenario, config, speed)
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config

@@ -1,14 +1,12 @@
-"""Position-based dynamics: allocation, bounds and the order of passes."""
+"""Position-based dynamics: allocation and the order of passes."""
 
-import math
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from pydantic import Field
 
-from fluidbench.method.contract import Config, Economy
+from fluidbench.method.contract import Economy
 from fluidbench.method.features import Feature
 from fluidbench.method.target import BACKENDS
 from fluidbench.method.timestep import Bound
@@ -16,7 +14,6 @@ from fluidbench.native.pool import Pool
 from fluidbench.native.scene import FRICTION, Scene
 from fluidbench.native.solver import Solver
 from fluidbench.scenario import Scenario
-from fluidbench.scenario.material import Material
 
 from .. import aging
 from ..backends import LACKING, backend_of
@@ -27,8 +24,10 @@ from ..search import FAULT_NEIGHBOURS
 from ..smoothing import cusp, spiky, spiky_slope
 from ..tool import table_of, tool_of
 from ..tool_map import Weights
-from ..viscosity import ImplicitViscosity, Tolerance, accuracy, beside
+from ..viscosity import ImplicitViscosity, beside
 from . import kernels_warp as kernels
+from .bounds import bounds_of
+from .config import ConfigPBD
 from .elasticity import Elasticity
 from .numbers import (
     MOVING,
@@ -43,31 +42,8 @@ from .numbers import (
     stiffest,
 )
 
-
-class ConfigPBD(Config):
-    support_ratio: Annotated[float, Field(ge=2.0, le=3.5)] = Field(2.4, description="kernel radius H over spacing")
-    iterations: Annotated[int, Field(ge=1, le=200)] = Field(5, description="density iterations per substep")
-    advance: Annotated[float, Field(gt=0, le=1)] = Field(0.125, description="accuracy: spacings moved per substep")
-    relaxation: Annotated[float, Field(gt=0)] = Field(0.2, description="constraint force mixing epsilon")
-    over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
-    viscous_tolerance: Tolerance = 1e-4
-    hourglass: Annotated[float, Field(ge=0, le=1)] = Field(
-        1.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows; 0 in what expands"
-    )
-    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
-
-    def zeta(self, material: Material) -> float:
-        """Of the hourglass control. It remembers where neighbours were: in what expands, children have others."""
-        return self.hourglass if material.expansion is None else 0.0
-
-
-# What constraints push in a substep goes as rho (d / dt)^2, and must match what stress and viscosity pull:
-PRESSED = 100.0  # viscous stress over that: what held at 42 was jammed at 416
-SHAKEN = 0.1  # yield stress over that: what held there gained energy at 0.6
-FEATURE = 8.0  # spacings across which matter shears
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
-WAVE = 0.1  # of the time that a wave takes across the narrowest of a solid, that a step may take
 
 
 def weights(support: float) -> Weights:
@@ -139,26 +115,7 @@ class SolverPBD(Solver):
 
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        d, g = scenario.spacing, scenario.peak_acceleration
-        a = config.advance
-        if scenario.material.expansion is not None:  # what grows moves at once, before anyone has seen it move
-            speed = max(speed, scenario.reference_speed)
-        limits = [Bound("accuracy", a * d / max(speed, 1e-12), f"{a:g} d / v", "references.md, H: no stability bound")]
-        if g > 0:
-            limits.append(Bound("free fall", (a * d / g) ** 0.5, f"sqrt({a:g} d / |g|)", "same, from rest"))
-        m = scenario.material
-        if m.viscosity > 0:
-            limits.append(accuracy(scenario))
-            if (drag := m.viscosity * scenario.reference_speed / (FEATURE * d)) > 0:
-                dt = d * math.sqrt(PRESSED * m.density / drag)
-                limits.append(Bound("viscous push", dt, f"d sqrt({PRESSED:g} rho {FEATURE:g} d / (mu U))", "measured"))
-        if m.is_solid:
-            dt = WAVE * scenario.narrowest / scenario.wave_speed
-            limits.append(Bound("elastic accuracy", dt, f"{WAVE:g} L / c", "backward Euler damps waves"))
-        elif m.youngs_modulus is not None and m.relaxation_time is None and m.strength > 0:
-            dt = d * math.sqrt(SHAKEN * m.density / m.strength)
-            limits.append(Bound("yield push", dt, f"d sqrt({SHAKEN:g} rho / tau_y)", "measured"))
-        return limits
+        return bounds_of(scenario, config, speed)
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config

@@ -1,6 +1,5 @@
-"""Weakly compressible SPH: allocation, bounds and the order of passes."""
+"""Weakly compressible SPH: allocation and the order of passes."""
 
-import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -23,7 +22,7 @@ from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..crowding import crowding, nearest
 from ..flow import plastic_strains
-from ..lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
+from ..lattice import lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
@@ -31,15 +30,15 @@ from ..smoothing import wendland_slope
 from ..theory import sph_numbers, stable_dt
 from ..tool import table_of, tool_of
 from ..tool_map import Weights
-from ..viscosity import WORTH, ImplicitViscosity, accuracy, beside, decided
+from ..viscosity import WORTH, ImplicitViscosity, beside, decided
 from . import kernels_warp as kernels
+from .bounds import bounds_of
 from .config import ConfigSPH
 from .particle import Smoothing
 
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 SPRAYED = 3.0  # particles across what is fed below which a paste that lands is sprayed: seen at 2.4, not at 3.4
 BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
-HOURGLASS_SAFETY = 0.8  # for the stress and the pressure act on the same waves
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
 FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 
@@ -121,41 +120,7 @@ class SolverSPH(Solver):
 
     @classmethod
     def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        c, m = scenario.wave_speed, scenario.material
-        ratio = config.smoothing(m)
-        h = ratio * scenario.spacing
-        # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1); that of the
-        # material is scaled to be exact in a lattice, 7 % up at h = 1.3 d.
-        explicit = 0.0 if config.viscosity == "implicit" else m.viscosity
-        nu = viscous_scale(ratio) * explicit / m.density + config.alpha(m) * h * c / 10.0
-        g = scenario.peak_acceleration
-        a = config
-        shear_speed = math.sqrt(m.shear_modulus / m.density)
-        hourglass = hourglass_limit(ratio, a.zeta(m), shear_speed, a.alpha(m) * c) if m.elastic else math.inf
-        return [
-            Bound(
-                "acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; references.md, H: < 1.73"
-            ),
-            Bound(
-                "viscous",
-                a.viscous_number * h * h / nu if nu > 0 else math.inf,
-                f"{a.viscous_number:g} h^2 / nu, artificial viscosity and the scale of the lattice included",
-                "references.md, H: 0.111 h^2 / nu for the Monaghan-Gingold operator",
-            ),
-            Bound(
-                "hourglass",
-                HOURGLASS_SAFETY * scenario.spacing * hourglass,
-                f"{HOURGLASS_SAFETY:g} of the limit of waves that no gradient shows, zeta = {a.zeta(m):g}",
-                "symplectic Euler on the shortest waves of a lattice",
-            ),
-            Bound(
-                "force",
-                a.force_number * math.sqrt(h / g) if g > 0 else math.inf,
-                f"{a.force_number:g} sqrt(h / g)",
-                "Monaghan 1992",
-            ),
-            *([accuracy(scenario)] if m.viscosity > explicit else []),
-        ]
+        return bounds_of(scenario, config, speed)
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config

@@ -1,0 +1,49 @@
+"""The bounds on a step of SPH."""
+
+import math
+
+from fluidbench.method.timestep import Bound
+from fluidbench.scenario import Scenario
+
+from ..lattice import hourglass_limit, viscous_scale
+from ..viscosity import accuracy
+from .config import ConfigSPH
+
+HOURGLASS_SAFETY = 0.8  # for the stress and the pressure act on the same waves
+
+
+def bounds_of(scenario: Scenario, config: ConfigSPH, speed: float) -> list[Bound]:
+    """Each [s], for matter that moves at `speed` [m/s] at most."""
+    c, m = scenario.wave_speed, scenario.material
+    ratio = config.smoothing(m)
+    h = ratio * scenario.spacing
+    # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1); that of the
+    # material is scaled to be exact in a lattice, 7 % up at h = 1.3 d.
+    explicit = 0.0 if config.viscosity == "implicit" else m.viscosity
+    nu = viscous_scale(ratio) * explicit / m.density + config.alpha(m) * h * c / 10.0
+    g = scenario.peak_acceleration
+    a = config
+    shear_speed = math.sqrt(m.shear_modulus / m.density)
+    hourglass = hourglass_limit(ratio, a.zeta(m), shear_speed, a.alpha(m) * c) if m.elastic else math.inf
+    return [
+        Bound("acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; references.md, H: < 1.73"),
+        Bound(
+            "viscous",
+            a.viscous_number * h * h / nu if nu > 0 else math.inf,
+            f"{a.viscous_number:g} h^2 / nu, artificial viscosity and the scale of the lattice included",
+            "references.md, H: 0.111 h^2 / nu for the Monaghan-Gingold operator",
+        ),
+        Bound(
+            "hourglass",
+            HOURGLASS_SAFETY * scenario.spacing * hourglass,
+            f"{HOURGLASS_SAFETY:g} of the limit of waves that no gradient shows, zeta = {a.zeta(m):g}",
+            "symplectic Euler on the shortest waves of a lattice",
+        ),
+        Bound(
+            "force",
+            a.force_number * math.sqrt(h / g) if g > 0 else math.inf,
+            f"{a.force_number:g} sqrt(h / g)",
+            "Monaghan 1992",
+        ),
+        *([accuracy(scenario)] if m.viscosity > explicit else []),
+    ]
