@@ -55,8 +55,9 @@ from ..taichi_bridge import (
     vec3,
     vec4,
 )
-from .kernels_warp import CRUSHED, FLOOR, MATTER, STATE
+from .force_warp import STATE
 from .particle import WHOLE, Smoothing
+from .strain_warp import CRUSHED, FLOOR, MATTER
 
 kernel = taichi_func(wendland)
 slope = taichi_func(wendland_slope)

@@ -9,9 +9,13 @@ import warp as wp
 from fluidbench.native.scene import Phase
 
 from ..aging import DISORDER
+from ..bind import warp_func
 from ..corrected import EDGE, SOUND
+from ..smoothing import wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+slope = warp_func(wendland_slope)
 
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
 

@@ -34,7 +34,9 @@ from ..viscosity import WORTH, ImplicitViscosity, beside, decided
 from . import kernels_warp as kernels
 from .bounds import bounds_of
 from .config import ConfigSPH
+from .force_warp import STATE, Forcing
 from .particle import Smoothing
+from .strain_warp import MATTER, Straining
 
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 SPRAYED = 3.0  # particles across what is fed below which a paste that lands is sprayed: seen at 2.4, not at 3.4
@@ -149,8 +151,8 @@ class SolverSPH(Solver):
         with wp.ScopedDevice(scene.device):
             self.unused = wp.zeros(1, dtype=wp.vec3)
             self.growth = pool.growth if scene.grows else wp.zeros(pool.size if scene.changes else 1, dtype=float)
-            self.matter = wp.zeros(pool.size * kernels.MATTER // 4, dtype=wp.vec4)
-            self.state = wp.zeros(pool.size * kernels.STATE[scene.elastic, scene.changes] // 4, dtype=wp.vec4)
+            self.matter = wp.zeros(pool.size * MATTER // 4, dtype=wp.vec4)
+            self.state = wp.zeros(pool.size * STATE[scene.elastic, scene.changes] // 4, dtype=wp.vec4)
             self.new_density = wp.zeros(pool.size, dtype=float)
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
@@ -180,7 +182,7 @@ class SolverSPH(Solver):
     def _bring_together(self) -> None:
         """What the passes over pairs read and write, as they take it."""
         pool, scene = self.pool, self.scene
-        self.straining, self.forcing = kernels.Straining(), kernels.Forcing()
+        self.straining, self.forcing = Straining(), Forcing()
         for data in (self.straining, self.forcing):
             data.dt, data.phases, data.phase_of = scene.dt, scene.phases, pool.phase
             data.new_density = self.new_density
@@ -320,7 +322,7 @@ class SolverSPH(Solver):
         return shear_stress(self.scene, self.pool)
 
     def traffic(self) -> dict[str, float]:
-        return self.neighbours.traffic([kernels.MATTER, kernels.STATE[self.scene.elastic, self.scene.changes]])
+        return self.neighbours.traffic([MATTER, STATE[self.scene.elastic, self.scene.changes]])
 
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}

@@ -1,0 +1,170 @@
+"""The second sum over neighbours of SPH: what pushes and drags."""
+
+import warp as wp
+
+from fluidbench.native.scene import Box, Force, Phase, force_at
+
+from ..corrected import mirrored_stress
+from ..images import image_traction, image_velocity
+from ..pairs import Pass, floats
+from ..tool import Tool, felt
+from .particle import Smoothing, slope
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+# Rows of `force`: position, mass | velocity, then of liquids the pressure term; of what has strength stress (9), the
+# traction that pulls back (3) and how far it is a straggler. Where partners differ also density, rest density,
+# viscosity, sound.
+STATE = {(False, False): 8, (True, False): 20, (False, True): 12, (True, True): 24}
+
+
+@wp.struct
+class Forcing:
+    """What `force` reads and writes of a particle itself."""
+
+    dt: wp.array(dtype=float)
+    phases: wp.array2d(dtype=Phase)
+    phase_of: wp.array(dtype=int)
+    forces: wp.array(dtype=Force)
+    new_density: wp.array(dtype=float)
+    acceleration: wp.array(dtype=wp.vec3)
+    tool: Tool
+
+
+def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> Pass:
+    """Momentum: pressure or stress, artificial and Newtonian viscosity. Sums: what pushes (3), and what pushes across
+    friction walls (3), which never pull and rub by Coulomb's law."""
+    N = width = STATE[strength, changing]
+    LAST = width - 4
+    Own, Other, Sums = floats(width + 4), floats(width), floats(6)
+
+    @wp.func
+    def begin(num: Smoothing, data: Forcing, world: int, i: int):
+        """Coefficients of artificial and of Newtonian viscosity, where they do not depend on the partner."""
+        phase = data.phases[world, data.phase_of[i]]
+        # At rest density: both partners must find the same force, and a cavitated liquid, whose density is low, would
+        # break the bound on dt. Monaghan 1992: alpha h c / rho; Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
+        shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
+        drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
+        return wp.vec4(shock, drag, 0.0, 0.0)
+
+    @wp.func
+    def seen(box: Box, data: Forcing, row: Other, j: int, code: int):
+        v = image_velocity(box, wp.vec3(row[4], row[5], row[6]), code)
+        for axis in range(3):
+            row[4 + axis] = v[axis]
+        if wp.static(strength):
+            t = wp.mat33(row[7], row[8], row[9], row[10], row[11], row[12], row[13], row[14], row[15])
+            t = mirrored_stress(box, t, code)
+            for a in range(3):
+                for b in range(3):
+                    row[7 + 3 * a + b] = t[a, b]
+            g = image_traction(box, wp.vec3(row[16], row[17], row[18]), code)
+            for axis in range(3):
+                row[16 + axis] = g[axis]
+        return row
+
+    @wp.func
+    def pair(num: Smoothing, own: Own, other: Other, r: wp.vec3):
+        u = wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
+        r2 = wp.dot(r, r)
+        q = wp.sqrt(r2) / num.h
+        f = other[3] * slope(q, num.h)
+        ur = wp.dot(u, r)
+        tiny = 0.01 * num.h * num.h
+        shock, drag = float(own[N]), float(own[N + 1])
+        mine, theirs = float(1.0), float(1.0)
+        if wp.static(changing):
+            # Stress over rho_i^2 rho0_j / rho0_i: light matter must not feel its heavy partner's mass, and the strain's
+            # sums, which are over those volumes, too, find the work that this does.
+            mine, theirs = 1.0 / other[LAST + 1], 1.0 / own[LAST + 1]
+            # both partners must find the same force: means of what differs between them
+            fast = own[LAST + 3] + other[LAST + 3]
+            shock = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(own[LAST], other[LAST])
+            thin = 2.0 * own[LAST + 2] * other[LAST + 2] / wp.max(own[LAST + 2] + other[LAST + 2], 1.0e-30)
+            drag = 10.0 * num.viscous_lattice * thin / (own[LAST + 1] * other[LAST + 1])
+        along = float(0.0)
+        push = wp.vec3(0.0, 0.0, 0.0)
+        if wp.static(strength):
+            both = wp.mat33(
+                mine * own[7] + theirs * other[7], mine * own[8] + theirs * other[8], mine * own[9] + theirs * other[9],
+                mine * own[10] + theirs * other[10],
+                mine * own[11] + theirs * other[11],
+                mine * own[12] + theirs * other[12],
+                mine * own[13] + theirs * other[13],
+                mine * own[14] + theirs * other[14],
+                mine * own[15] + theirs * other[15],
+            )  # fmt: skip
+            pull = wp.vec3(
+                theirs * other[16] - mine * own[16],
+                theirs * other[17] - mine * own[17],
+                theirs * other[18] - mine * own[18],
+            )
+            push = both * r + pull
+            along = wp.max(own[19], other[19]) * shock * ur / (r2 + tiny)
+        else:
+            both_pressures = mine * own[7] + theirs * other[7]
+            # artificial viscosity for approaching particles (Monaghan 1992)
+            along = shock * wp.min(ur, 0.0) / (r2 + tiny) - both_pressures
+        if wp.static(viscous):
+            along += drag * ur / (r2 + 0.01 * tiny)
+        push = f * (push + along * r)
+        return Sums(push[0], push[1], push[2], 0.0, 0.0, 0.0)
+
+    @wp.func
+    def held(rough: wp.vec3, sums: Sums):
+        x, y, z = rough[0] * sums[0], rough[1] * sums[1], rough[2] * sums[2]
+        return Sums(sums[0] - x, sums[1] - y, sums[2] - z, x, y, z)
+
+    @wp.func
+    def by_tool(num: Smoothing, data: Forcing, world: int, i: int, own: Own, others: wp.vec3):
+        """The acceleration by a rigid body, beside that by others: its stress is the particle's own, and its drag is
+        implicit in time, for beside the surface it is stiffer than any between particles."""
+        a = wp.vec3(0.0, 0.0, 0.0)
+        found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
+        if found.on == 1:
+            rho, h = data.new_density[i], data.dt[world]
+            both = 2.0 * rho * found.first
+            if wp.static(changing):
+                both *= 1.0 / own[LAST + 1]
+            if wp.static(strength):
+                a = wp.mat33(own[7], own[8], own[9], own[10], own[11], own[12], own[13], own[14], own[15]) * both
+            else:
+                a = -own[7] * both
+            if data.tool.slips == 1:
+                a = wp.dot(a, found.normal) * found.normal
+            if wp.static(viscous):
+                phase = data.phases[world, data.phase_of[i]]
+                rest = float(phase.density)
+                if wp.static(changing):
+                    rest = own[LAST + 1]
+                drag = 10.0 * num.viscous_lattice * phase.viscosity / (rest * rest) * rho
+                u = wp.vec3(own[4], own[5], own[6]) + h * (a + others) - found.velocity
+                still = wp.identity(n=3, dtype=float) - (h * drag) * found.drag
+                a += (wp.inverse(still) * u - u) / h
+        return a
+
+    @wp.func
+    def finish(num: Smoothing, box: Box, data: Forcing, world: int, i: int, own: Own, sums: Sums):
+        x = wp.vec3(own[0], own[1], own[2])
+        a = wp.vec3(sums[0], sums[1], sums[2])
+        pull = force_at(data.forces[world], x)
+        h = data.dt[world]
+        for axis in range(3):
+            if sums[3 + axis] != 0.0:
+                inward = wp.sign(0.5 * (box.lower[axis] + box.upper[axis]) - x[axis])
+                normal = wp.max(inward * sums[3 + axis], 0.0)
+                friction = box.lower_friction[axis]
+                if inward < 0.0:
+                    friction = box.upper_friction[axis]
+                slide = wp.vec3(own[4], own[5], own[6]) + h * (a + pull)
+                slide[axis] = 0.0
+                speed = wp.length(slide)
+                grip = wp.min(friction * normal, speed / h)
+                a -= (grip / wp.max(speed, 1.0e-12)) * slide
+                a[axis] = a[axis] + inward * normal
+        if wp.static(tooled):
+            a += by_tool(num, data, world, i, own, a + pull)
+        data.acceleration[i] = a + pull
+
+    return Pass(Smoothing, Forcing, width, 6, pair, finish, begin, seen, held)
