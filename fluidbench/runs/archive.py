@@ -4,6 +4,7 @@ again, elsewhere and later."""
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -55,13 +56,13 @@ def shown(folder: Path) -> str:
 
 
 def where(runs: Iterable[Run]) -> str:
-    """The machine in a word or two: its GPU (as it was asked for, where nothing was run), or CPU; and what wrote its
-    kernels, where that is not the default."""
+    """The machine in a word or two: its GPU without its memory (as it was asked for, where nothing was run), or CPU;
+    and what wrote its kernels, where that is not the default."""
     records = [run.record for run in runs]
     asked = next((r.device for r in records if r.device != "cpu"), "CPU")
     device = next((r.machine["device"] for r in records if "device" in r.machine), asked)
     backend = next((r.backend for r in records), DEFAULT_BACKEND)
-    return device + f", {backend}" * (backend != DEFAULT_BACKEND)
+    return re.sub(r" \d+GB.*", "", device) + f", {backend}" * (backend != DEFAULT_BACKEND)
 
 
 def of_other_code(studies: Mapping[str, Iterable[Run]]) -> list[str]:

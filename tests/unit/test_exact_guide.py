@@ -104,6 +104,7 @@ def test_jobs_are_named_by_their_scenarios():
 
 def test_the_chosen_machine_is_named_where_nothing_was_run():
     assert where([finished(device="cuda:0", verdict="refused"), finished(machine={"device": "H200"})]) == "H200"
+    assert where([finished(machine={"device": "NVIDIA H100 80GB HBM3"})]) == "NVIDIA H100"
     assert where([finished(device="cuda:0", verdict="refused")]) == "cuda:0" and where([]) == "CPU"
 
 
