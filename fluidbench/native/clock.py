@@ -26,7 +26,7 @@ class Hours:
     exit: wp.array(dtype=wp.vec3)  # where matter is let go [m]
     drift: wp.array(dtype=wp.vec3)  # its mean velocity until the next row [m/s]
     extruded: wp.array(dtype=float)  # time spent extruding [s]
-    pace: wp.array(dtype=float)  # share of the time until the next row that is [-]
+    feeding: wp.array(dtype=float)  # share of the time until the next row in which it extrudes [-]
     entered: wp.array(dtype=int)  # particles of the stream in the nozzle or beyond
     tick: float  # from row to row [s]
 
@@ -51,7 +51,7 @@ class Clock:
             hours.row = wp.zeros(1, dtype=int)
             hours.time, hours.extruded = wp.zeros(ROWS + 1, dtype=float), wp.zeros(ROWS + 1, dtype=float)
             hours.exit, hours.drift = wp.zeros(ROWS + 1, dtype=wp.vec3), wp.zeros(ROWS + 1, dtype=wp.vec3)
-            hours.entered, hours.pace = wp.zeros(ROWS + 1, dtype=int), wp.zeros(ROWS + 1, dtype=float)
+            hours.entered, hours.feeding = wp.zeros(ROWS + 1, dtype=int), wp.zeros(ROWS + 1, dtype=float)
 
     @cached_property
     def stream(self) -> Stream | None:
@@ -116,10 +116,10 @@ class Clock:
                 "exit": exits,
                 "drift": np.diff(exits, axis=0, append=exits[-1:]),
                 "extruded": extruded,
-                "pace": np.diff(extruded, append=extruded[-1:]),
+                "feeding": np.diff(extruded, append=extruded[-1:]),
             }
             columns["drift"][:-1] /= step[:, None]
-            columns["pace"][:-1] /= step
+            columns["feeding"][:-1] /= step
             columns["entered"] = self._entered = self.stream.entered(times) * self.stream.points
             self._released = self.stream.released(times)
         for name, values in columns.items():

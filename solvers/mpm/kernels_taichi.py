@@ -279,7 +279,7 @@ def passes(alone: bool) -> SimpleNamespace:
         row: Ints,
         exit: Vectors,
         drift: Vectors,
-        pace: Floats,
+        feeding: Floats,
         moving: Quads,
     ):
         for t in range(ti.min(active[0] * 64, raw.shape[0])):
@@ -306,9 +306,9 @@ def passes(alone: bool) -> SimpleNamespace:
                         before = ti.max(row[0] - 1, 0)
                         away = grid.origin + grid.dx * inside - exit[row[0]]
                         within = away[0] ** 2 + away[1] ** 2 < piston.bore and away[2] > -BELOW * grid.dx[2]
-                        if within and pace[before] > 0.0:
+                        if within and feeding[before] > 0.0:
                             going = drift[before]
-                            v = vec3(going[0], going[1], ti.min(v[2], going[2] - pace[before] * piston.speed))
+                            v = vec3(going[0], going[1], ti.min(v[2], going[2] - feeding[before] * piston.speed))
                     density = total[3] * grid.inv_volume
                     if wall:
                         v = bounded(grid, inside, touching, v)

@@ -33,14 +33,14 @@ class Piston:
     row: wp.array(dtype=int)  # of the end of the tick that substeps are in
     exit: wp.array(dtype=wp.vec3)
     drift: wp.array(dtype=wp.vec3)
-    pace: wp.array(dtype=float)
+    feeding: wp.array(dtype=float)
 
 
 def piston_of(scene: Scene, acts: bool) -> Any:
     """The piston of a scene that is fed, if it `acts`."""
     piston, hours = Piston(), scene.clock.hours
     radius, speed = scene.clock.bore
-    for name in ("row", "exit", "drift", "pace"):
+    for name in ("row", "exit", "drift", "feeding"):
         setattr(piston, name, getattr(hours, name))
     if acts and radius > 0.0:
         piston.on, piston.bore, piston.speed = 1, radius * radius, speed
@@ -53,9 +53,9 @@ def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
     out = v
     row = piston.row[0]
     before = wp.max(row - 1, 0)
-    pace = piston.pace[before]
+    feeding = piston.feeding[before]
     away = x - piston.exit[row]
-    if pace > 0.0 and away[2] > -BELOW * grid.dx[2] and away[0] * away[0] + away[1] * away[1] < piston.bore:
+    if feeding > 0.0 and away[2] > -BELOW * grid.dx[2] and away[0] * away[0] + away[1] * away[1] < piston.bore:
         drift = piston.drift[before]
-        out = wp.vec3(drift[0], drift[1], wp.min(v[2], drift[2] - pace * piston.speed))
+        out = wp.vec3(drift[0], drift[1], wp.min(v[2], drift[2] - feeding * piston.speed))
     return out

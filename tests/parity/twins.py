@@ -45,7 +45,7 @@ def arrays_of(sim: Simulation) -> dict[str, wp.array]:
     found = {f"pool.{name}": array for name, array in sim.pool.fields.items()}
     found |= {"pool.count": sim.pool.count, "pool.fault": sim.pool.fault}
     found |= {name: getattr(sim.scene, name) for name in ("dt", "force", "phases")}
-    found |= {f"hours.{name}": getattr(sim.scene.clock.hours, name) for name in ("row", "exit", "drift", "pace")}
+    found |= {f"hours.{name}": getattr(sim.scene.clock.hours, name) for name in ("row", "exit", "drift", "feeding")}
     parts = [("", sim.solver), *((prefix, getattr(sim.solver, name, None)) for prefix, name in PARTS)]
     for prefix, owner in parts:
         for name, value in vars(owner).items() if owner is not None else ():

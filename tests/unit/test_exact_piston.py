@@ -24,7 +24,7 @@ def answers(places, velocity, pace=0.5):
     """Of nodes that would move at `velocity`, about a nozzle of radius 0.1 at (1, 2, 3) that goes at (4, 5, 0.2)."""
     piston, grid = Piston(), Grid()
     piston.on, piston.bore, piston.speed = 1, 0.01, 1.0
-    piston.row, piston.pace = wp.array([2], dtype=int), wp.array([9.0, pace, 9.0], dtype=float)
+    piston.row, piston.feeding = wp.array([2], dtype=int), wp.array([9.0, pace, 9.0], dtype=float)
     nowhere = [9.0] * 3
     piston.exit = wp.array([nowhere, nowhere, [1, 2, 3]], dtype=wp.vec3)
     piston.drift = wp.array([nowhere, [4, 5, 0.2], nowhere], dtype=wp.vec3)
@@ -104,7 +104,7 @@ def test_it_goes_as_what_is_carried_does():
         sim.advance_tick()
         sim.look()
         row, hours = int(sim.scene.clock.hours.row.numpy()[0]), sim.scene.clock.hours
-        drift, pace = hours.drift.numpy()[row - 1], float(hours.pace.numpy()[row - 1])
+        drift, pace = hours.drift.numpy()[row - 1], float(hours.feeding.numpy()[row - 1])
         frame = sim.frame()
         carried = frame["velocity"][frame["held"] == CARRIED]
         piston = drift - [0.0, 0.0, pace * sim.solver.piston.speed]
