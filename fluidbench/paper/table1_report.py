@@ -50,7 +50,7 @@ def report(studies: Studies, root: Path) -> Report:
     found = gathered(studies)
     counts = Counter(verdict(place) for place in found)
     findings = [f"Of {len(found)} statements " + ", ".join(f"{n} {WORDS[v]}" for v, n in counts.items()) + "."]
-    findings += of_other_code({label: e.sweeps() for label, e in studies.items()})
+    findings += [f"{line}." for line in of_other_code({label: e.sweeps() for label, e in studies.items()})]
     findings += repeated(found)
     findings += [sentence(place) for place in found if verdict(place) in (OPEN, DEPENDS, LOOSE)]
     scenario = next(iter(studies.values())).scenario.name

@@ -75,7 +75,7 @@ def of_other_code(studies: Mapping[str, Iterable[Run]]) -> list[str]:
     }
     newest = max(made, key=lambda label: made[label][1], default="")
     return [
-        f"{label} ({day}) was made by other code than {newest} ({made[newest][1]}): what differs may differ for that."
+        f"{label} ({day}) was made by other code than {newest} ({made[newest][1]}): what differs may differ for that"
         for label, (sources, day) in made.items()
         if sources != made[newest][0]
     ]
