@@ -5,6 +5,7 @@ progress as lines of JSON on its standard output. `python -m fluidbench.runs.pro
 """
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -84,11 +85,12 @@ def _attend(work: Work, folder: Path, progress: Report | None, gpu: str) -> tupl
             timed.set()
             child.kill()
 
-        _children.add(child)
-        killer = threading.Timer(limit, stop) if limit is not None else None
-        if killer is not None:
-            killer.start()
-        try:
+        killer = threading.Timer(math.inf if limit is None else limit, stop)
+        killer.daemon = True
+        try:  # an interruption may come at any point from here on, within the timer's start, too
+            _children.add(child)
+            if limit is not None:
+                killer.start()
             assert child.stdout is not None
             for line in child.stdout:
                 if line.startswith(PROGRESS):
@@ -107,8 +109,7 @@ def _attend(work: Work, folder: Path, progress: Report | None, gpu: str) -> tupl
             raise
         finally:
             _children.discard(child)
-            if killer is not None:
-                killer.cancel()
+            killer.cancel()
     return child.returncode, timed.is_set(), obstacle
 
 

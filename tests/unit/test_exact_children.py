@@ -4,13 +4,14 @@ import hashlib
 import math
 import os
 import sys
+import threading
 import types
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from fluidbench.errors import Obstacle, UserError
+from fluidbench.errors import Interrupted, Obstacle, UserError
 from fluidbench.method.target import HERE, Target
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
@@ -128,6 +129,24 @@ def test_a_child_that_meets_an_obstacle_or_takes_too_long(tmp_path, monkeypatch)
     monkeypatch.setattr(process, "GRACE", 0.1)
     *_, launch = launched(tmp_path, monkeypatch, "import time; time.sleep(60)", wall_limit=0.1)
     assert launch().verdict == "timeout"
+
+
+def test_an_interruption_while_the_wall_limit_is_set_leaves_no_child_and_no_clock(tmp_path, monkeypatch):
+    """As by a signal that comes while a thread starts: its clock kept the command alive for half an hour."""
+    started = []
+
+    def start(timer, begin=threading.Timer.start):
+        begin(timer)
+        started.append((timer, *process._children))
+        raise Interrupted
+
+    monkeypatch.setattr(threading.Timer, "start", start)
+    *_, launch = launched(tmp_path, monkeypatch, "import time; time.sleep(60)", wall_limit=600.0)
+    with pytest.raises(Interrupted):
+        launch()
+    ((timer, child),) = started
+    timer.join(10.0)
+    assert not timer.is_alive() and child.returncode is not None and not process._children
 
 
 def pictured(device=None, **outcome):
