@@ -9,6 +9,7 @@ from typing import Any
 
 from ..report.report import Report, machine_of, record_link
 from ..report.table import Table
+from ..runs.archive import of_other_code
 from ..study.again import command_of
 from . import PAPER as TITLE
 from .rows import Row, claims, printed, spread
@@ -28,17 +29,19 @@ def report(rows: Sequence[Row], root: Path) -> Report:
     findings = [f"{m}: '{claim}': {verdict}. {measured}." for m, claim, measured, verdict in told]
     runs = {_name(row): [record_link(r, root) for r in [*row.bare, *row.filmed]] for row in rows}
     machines = [f"{m}: {machine_of(r for row in rows if row.machine == m for r in row.bare)}" for m in _machines(rows)]
+    methods = dict.fromkeys(row.method for row in rows)
+    mixed = of_other_code({m: [r for row in rows if row.method == m for r in row.bare] for m in methods})
     return Report(
         "table2",
         "fluidbench table2: the printed tower, feature by feature",
         f'The timing of "{TITLE}", beside the same towers here.',
-        findings,
+        findings + [f"{line}." for line in mixed],
         [shown, verdicts],
         pd.DataFrame([_row(row) for row in rows]),
         [],
         runs,
         "; ".join(machines),
-        files={"table2.md": _markdown(rows, shown, verdicts, machines)},
+        files={"table2.md": _markdown(rows, shown, verdicts, [*machines, *mixed])},
     )
 
 
@@ -97,7 +100,7 @@ def _row(row: Row) -> dict[str, Any]:
     }
 
 
-def _markdown(rows: Sequence[Row], shown: Table, verdicts: Table, machines: Sequence[str]) -> str:
+def _markdown(rows: Sequence[Row], shown: Table, verdicts: Table, notes: Sequence[str]) -> str:
     """A page of its own, with the commands that make its runs again."""
     import pandas as pd
 
@@ -119,7 +122,7 @@ def _markdown(rows: Sequence[Row], shown: Table, verdicts: Table, machines: Sequ
             "",
             table(verdicts),
             "",
-            *(f"- {machine}" for machine in machines),
+            *(f"- {note}" for note in notes),
             "",
             "```sh",
             *(line for line in again if line),

@@ -66,19 +66,26 @@ def where(runs: Iterable[Run]) -> str:
 
 
 def of_other_code(studies: Mapping[str, Iterable[Run]]) -> list[str]:
-    """A line for each study, by its label, that other sources made than the newest: where they differ, that may be
-    why."""
-    made = {
-        label: ({r.code.get("sources", "") for r in records}, max(r.machine.get("time", "") for r in records)[:10])
-        for label, runs in studies.items()
-        if (records := [run.record for run in runs])
-    }
-    newest = max(made, key=lambda label: made[label][1], default="")
-    return [
-        f"{label} ({day}) was made by other code than {newest} ({made[newest][1]}): what differs may differ for that"
-        for label, (sources, day) in made.items()
-        if sources != made[newest][0]
-    ]
+    """A line for each study, by its label, of which other sources than those of the newest run made something: where
+    they differ, that may be why."""
+    made = {label: [r for run in runs if "sources" in (r := run.record).code] for label, runs in studies.items()}
+    records = [r for own in made.values() for r in own]
+    if not records:
+        return []
+    newest = max(records, key=lambda r: r.machine.get("time", ""))
+    lines = []
+    for label, own in made.items():
+        other = [r for r in own if r.code["sources"] != newest.code["sources"]]
+        if other:
+            share = "was" if len(other) == len(own) else "was in part"
+            lines.append(
+                f"{label} {share} made by other code ({_day(other[-1])}) than the newest here ({_day(newest)})"
+            )
+    return lines
+
+
+def _day(record: Record) -> str:
+    return record.machine.get("time", "at an unknown time")[:10]
 
 
 def places(folder: Path, name: str, verb: str) -> list[Path]:

@@ -20,11 +20,11 @@ def ask(piston: Piston, grid: Grid, places: wp.array(dtype=wp.vec3), velocity: w
     found[i] = driven(piston, grid, places[i], velocity)
 
 
-def answers(places, velocity, pace=0.5):
+def answers(places, velocity, feeding=0.5):
     """Of nodes that would move at `velocity`, about a nozzle of radius 0.1 at (1, 2, 3) that goes at (4, 5, 0.2)."""
     piston, grid = Piston(), Grid()
     piston.on, piston.bore, piston.speed = 1, 0.01, 1.0
-    piston.row, piston.feeding = wp.array([2], dtype=int), wp.array([9.0, pace, 9.0], dtype=float)
+    piston.row, piston.feeding = wp.array([2], dtype=int), wp.array([9.0, feeding, 9.0], dtype=float)
     nowhere = [9.0] * 3
     piston.exit = wp.array([nowhere, nowhere, [1, 2, 3]], dtype=wp.vec3)
     piston.drift = wp.array([nowhere, [4, 5, 0.2], nowhere], dtype=wp.vec3)
@@ -48,7 +48,7 @@ def test_what_flows_away_faster_is_not_held_back():
 
 
 def test_a_nozzle_that_does_not_extrude_drives_nothing():
-    assert answers(INSIDE, (7, 8, 9), pace=0.0) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
+    assert answers(INSIDE, (7, 8, 9), feeding=0.0) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
 
 
 PASTE = {"density": 2000.0, "youngs_modulus": 1e5, "poisson_ratio": 0.45, "yield_stress": 1e3}
@@ -104,10 +104,10 @@ def test_it_goes_as_what_is_carried_does():
         sim.advance_tick()
         sim.look()
         row, hours = int(sim.scene.clock.hours.row.numpy()[0]), sim.scene.clock.hours
-        drift, pace = hours.drift.numpy()[row - 1], float(hours.feeding.numpy()[row - 1])
+        drift, feeding = hours.drift.numpy()[row - 1], float(hours.feeding.numpy()[row - 1])
         frame = sim.frame()
         carried = frame["velocity"][frame["held"] == CARRIED]
-        piston = drift - [0.0, 0.0, pace * sim.solver.piston.speed]
+        piston = drift - [0.0, 0.0, feeding * sim.solver.piston.speed]
         if len(carried):
             assert carried.mean(axis=0) == pytest.approx(piston, abs=1e-4)
         seen.add(tuple(np.round(piston, 3)))
