@@ -47,7 +47,9 @@ class Neighbours:
         self.reach, self.half_skin2 = radius + skin, (0.5 * skin) ** 2
         self.group = LANES if scene.device.is_cpu and backend.name == "warp" else 1
         self.groups = pool.size // self.group
-        self.limit = self.group * room(self.reach / scene.spacing)
+        expansion = scene.scenario.material.expansion
+        least = 1.0 if expansion is None else expansion.least_volume
+        self.limit = self.group * room(self.reach / scene.spacing, least)
         with wp.ScopedDevice(scene.device):
             self.entries = wp.empty(self.groups * self.limit, dtype=int)
             self.number = wp.zeros(self.groups, dtype=int)
@@ -148,9 +150,10 @@ def side_by_side(scene: Scene, pool: Pool) -> CellOrder:
     return CellOrder(scene, pool, LANES ** (1.0 / 3.0) * scene.spacing)
 
 
-def room(reach_ratio: float) -> int:
-    """Entries to allow for: 1.7 times those of a lattice. Odd multiples of 8, lest rows collide in the cache."""
-    return 16 * math.ceil(ROOM * 4.0 / 3.0 * math.pi * reach_ratio**3 / 16.0) + 8
+def room(reach_ratio: float, least: float = 1.0) -> int:
+    """Entries to allow for: 1.7 times those of a lattice of particles that take `least` spacings^3 each. Odd multiples
+    of 8, lest rows collide in the cache."""
+    return 16 * math.ceil(ROOM * 4.0 / 3.0 * math.pi * reach_ratio**3 / least / 16.0) + 8
 
 
 def threads_for(particles: int, entries: float) -> int:

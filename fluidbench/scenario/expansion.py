@@ -93,6 +93,11 @@ class Expansion(Model):
         grown = 1.0 + (self.ratio - 1.0) * (1.0 - left)
         return float((size * (self.ratio - 1.0) / self.time * left / 3.0 * grown ** (-2.0 / 3.0)).max())
 
+    @property
+    def least_volume(self) -> float:
+        """Of a particle at rest, over spacing^3: that of a half just born."""
+        return 0.5 * LARGEST if self.kind == "growth" and self.split else 1.0
+
     def generations(self, fill: float) -> int:
         """growth: how often a particle of `fill` times spacing^3 will have split in the end."""
         return max(0, math.ceil(math.log2(self.ratio * fill / LARGEST) - 1e-9)) if self.split else 0

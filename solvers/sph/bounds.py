@@ -24,7 +24,7 @@ def bounds_of(scenario: Scenario, config: ConfigSPH, speed: float) -> list[Bound
     g = scenario.peak_acceleration
     a = config
     shear_speed = math.sqrt(m.shear_modulus / m.density)
-    hourglass = hourglass_limit(ratio, a.zeta(m), shear_speed, a.alpha(m) * c) if m.elastic else math.inf
+    hourglass = hourglass_limit(ratio, a.hourglass, shear_speed, a.alpha(m) * c) if m.elastic else math.inf
     return [
         Bound("acoustic", a.cfl * h / (c + speed), f"{a.cfl:g} h / (c + v)", "Monaghan 2005; references.md, H: < 1.73"),
         Bound(
@@ -36,7 +36,7 @@ def bounds_of(scenario: Scenario, config: ConfigSPH, speed: float) -> list[Bound
         Bound(
             "hourglass",
             HOURGLASS_SAFETY * scenario.spacing * hourglass,
-            f"{HOURGLASS_SAFETY:g} of the limit of waves that no gradient shows, zeta = {a.zeta(m):g}",
+            f"{HOURGLASS_SAFETY:g} of the limit of waves that no gradient shows, zeta = {a.hourglass:g}",
             "symplectic Euler on the shortest waves of a lattice",
         ),
         Bound(

@@ -31,7 +31,7 @@ class ConfigSPH(Config):
     artificial_viscosity_solid: NonNegative = Field(1.0, description="alpha for solids and pastes")
     artificial_viscosity_viscoelastic: NonNegative = Field(0.3, description="alpha for liquids that relax")
     hourglass: NonNegative = Field(
-        2.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows; 0 in what expands"
+        2.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows"
     )
     shifting: NonNegative = Field(4.0, description="shift out of a crowd, over strain and h^2 times its gradient")
     density_feedback: NonNegative = Field(
@@ -44,10 +44,6 @@ class ConfigSPH(Config):
         if material.relaxation_time is not None:
             return self.artificial_viscosity_viscoelastic
         return self.artificial_viscosity_solid if material.elastic else self.artificial_viscosity
-
-    def zeta(self, material: Material) -> float:
-        """Of the hourglass control. It remembers where neighbours were: in what expands, children have others."""
-        return self.hourglass if material.expansion is None else 0.0
 
     def smoothing_key(self, material: Material) -> str:
         if not material.elastic:

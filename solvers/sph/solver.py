@@ -138,7 +138,7 @@ class SolverSPH(Solver):
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.compact = (scene.spacing / opposing(ratio)) ** 2
-        self.num.hourglass, self.num.shifting = config.zeta(scene.scenario.material), config.shifting
+        self.num.hourglass, self.num.shifting = config.hourglass, config.shifting
         self.num.density_feedback = config.density_feedback
         self.num.density_tolerance = config.density_tolerance
         pool.add_field("density", float, scene.scenario.material.density)

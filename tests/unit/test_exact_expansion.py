@@ -10,6 +10,8 @@ from fluidbench.native.pool import OutOfCapacity, Pool
 from fluidbench.native.process.expansion import Growing
 from fluidbench.native.process.placement import Placement
 from fluidbench.native.scene import Scene
+from fluidbench.scenario.expansion import Expansion
+from solvers.neighbours import ROOM, room
 
 from ..conftest import scenario
 
@@ -307,3 +309,13 @@ def test_children_stay_inside_the_walls_and_come_back_at_periodic_ones():
         assert 0 <= x.min() < 0.25 and 20 - 0.25 < x.max() <= 20 and ((x < 4) | (x > 16)).all()
         from_low = pool.origin.numpy()[: pool.counts[0]] % 64 < 32
         assert (x[from_low] > 16).any() and (x[from_low] < 4).any()
+
+
+def test_lists_have_the_same_margin_for_what_has_just_split():
+    """A particle splits at 1.5 spacings^3: each half then takes three quarters of one."""
+    splits = Expansion(kind="growth", ratio=8.0)
+    assert splits.least_volume == 0.75
+    assert Expansion(kind="growth", ratio=8.0, split=False).least_volume == 1.0
+    assert Expansion(kind="spawn", ratio=8.0).least_volume == 1.0
+    lattice = 4.0 / 3.0 * math.pi * 3.375**3
+    assert ROOM * lattice / 0.75 <= room(3.375, splits.least_volume) < ROOM * lattice / 0.75 + 24
