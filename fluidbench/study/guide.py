@@ -13,9 +13,9 @@ from ..method.verdict import lacking
 from ..runs import archive
 from ..runs.record import Run
 from ..scenario import Scenario
+from .candidates import WALL_LIMIT, run_candidates
 from .guide_report import report
 from .result import Result
-from .select import WALL_LIMIT, candidates, shares_cores
 from .selection import Selection, Trust, assess
 from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number
 
@@ -65,11 +65,10 @@ def guide(
     names = methods_of(methods, options)
     place = Workplace.of(options, WALL_LIMIT, names)
     subjects = subjects_of(scenarios, quick)
-    planned = candidates(subjects, names, place, within)
-    made = iter(place.run([job for own in planned.values() for job in own.jobs], "guide", shares_cores(place)))
+    tried = run_candidates(subjects, names, place, "guide", within)
     jobs = {
-        name: assess(subjects[name], names, [next(made) for _ in own.jobs], subjects[name].measured, own.untried)
-        for name, own in planned.items()
+        name: assess(subjects[name], names, own.runs, subjects[name].measured, own.untried)
+        for name, own in tried.items()
     }
     studies = {archive.where(run for found in jobs.values() for run in found.runs): jobs}
     return _concluded(studies, wanted, place.store.root, keeper=place.keeper)

@@ -11,8 +11,9 @@ from fluidbench.measure.reference import Answer
 from fluidbench.method.target import Target
 from fluidbench.scenario.library import load
 from fluidbench.study import selection as module
+from fluidbench.study.candidates import candidates, pace_of, run_candidates
 from fluidbench.study.fit import extrapolate
-from fluidbench.study.select import candidates, select
+from fluidbench.study.select import select
 from fluidbench.study.selection import (
     Candidate,
     Selection,
@@ -28,6 +29,7 @@ from ..conftest import bead, scenario
 from .made import BEAD, finished, working, workplace_in
 
 afford = importlib.import_module("fluidbench.study.afford")
+planning = importlib.import_module("fluidbench.study.candidates")
 ALWAYS = (math.inf, math.inf)
 
 
@@ -320,7 +322,8 @@ def test_a_selection_needs_candidates_and_every_run(tmp_path, monkeypatch, verdi
 def costing(monkeypatch, **cost):
     """Methods of so many seconds at the scenario's spacing, and runs that cost nothing to start."""
     monkeypatch.setattr(afford, "STARTING", 0.0)
-    monkeypatch.setattr(afford, "_expected", lambda s, method: cost[method] * (s.spacing / BEAD.spacing) ** -4)
+    for user in (afford, planning):
+        monkeypatch.setattr(user, "expected", lambda s, method: cost[method] * (s.spacing / BEAD.spacing) ** -4)
     return lambda jobs: sum(cost[j.method] * (j.scenario["spacing"] / BEAD.spacing) ** -4 for j in jobs)
 
 
@@ -388,10 +391,61 @@ def test_time_is_of_the_cores_that_there_are(tmp_path, monkeypatch):
         assert 100.0 * min(share, cores()) / 1.05**4 < used <= 100.0 * min(share, cores())
 
 
+def slow(cost, by, monkeypatch):
+    """Runs that take `by[method]` times what `costing` says, with what else a record has of that."""
+
+    def answer(job):
+        wall = by[job.method] * cost[job.method] * (job.scenario["spacing"] / BEAD.spacing) ** -4
+        half = {"simulated_s": 0.5 * job.scenario["duration"], "wall_s": 0.5 * wall, "total_s": 0.5 * wall + 3.0}
+        own = {"measures": {"bead_width_m": 0.01}, "spacing": job.scenario["spacing"], "input": job.scenario}
+        return finished(job.method, "completed", **own, **half)
+
+    return working(monkeypatch, answer)
+
+
+def test_spacings_are_by_what_one_run_of_each_method_takes_here(tmp_path, monkeypatch):
+    """SPH takes three times as long as estimated, PBD half. What the trials took is spent, and each is evidence."""
+    cost = {"sph": 40.0, "pbd": 20.0}
+    spent = costing(monkeypatch, **cost)
+    calls = slow(cost, {"sph": 3.0, "pbd": 0.5}, monkeypatch)
+    place = workplace_in(tmp_path, workers=1, progress=False)
+    guess = candidates({"bead": BEAD}, ["sph", "pbd"], place, 300.0)["bead"]
+    own = run_candidates({"bead": BEAD}, ["sph", "pbd"], place, "select", 300.0)["bead"]
+    first, rest = calls
+    assert [job.scenario["spacing"] for job in first] == [guess.of(m)[1].scenario["spacing"] for m in ("sph", "pbd")]
+    assert all(own.of(m)[-1] == job for m, job in zip(("sph", "pbd"), first, strict=True)) and len(own.jobs) == 10
+    left = 300.0 - sum(0.5 * by * spent([job]) + 3.0 for by, job in zip((3.0, 0.5), first, strict=True))
+    took = 3.0 * spent(own.of("sph")[:4]) + 0.5 * spent(own.of("pbd")[:4])
+    assert left / 1.05**8 < took <= left
+    assert (costs := [spent([job]) for job in rest]) == sorted(costs, reverse=True)  # none is waited for alone
+    assert [run.record.spacing_m for run in own.runs] == [job.scenario["spacing"] for job in own.jobs]
+
+
+def test_a_trial_of_what_there_is_no_time_for_is_no_evidence(tmp_path, monkeypatch):
+    cost = {"sph": 10.0, "pbd": 10.0}
+    costing(monkeypatch, **cost)
+    slow(cost, {"sph": 1e7, "pbd": 0.1}, monkeypatch)
+    place = workplace_in(tmp_path, workers=1, progress=False)
+    with pytest.raises(UserError, match="within 300 s no method can compute 3 spacings"):
+        run_candidates({"bead": BEAD}, ["sph"], place, "select", 300.0)
+    monkeypatch.setattr(planning, "_time", lambda *_: 300.0)
+    own = run_candidates({"bead": BEAD}, ["sph", "pbd"], place, "select", 300.0)["bead"]
+    assert own.of("sph") == [] and len(own.of("pbd")) == 5
+    assert own.untried == ["sph: left out: 3 spacings take longer than its share of the time"]
+
+
+def test_a_pace_is_of_what_was_run():
+    """Half the time in 3 s; nothing where nothing was run, or the estimate is nothing."""
+    own = {"input": BEAD.model_dump(mode="json"), "wall_s": 3.0, "simulated_s": 0.5 * BEAD.duration}
+    assert pace_of(finished("mpm", **own)) == pytest.approx(6.0 / afford.expected(BEAD, "mpm"))
+    assert math.isnan(pace_of(finished("mpm", **own | {"simulated_s": 0.0})))
+    assert math.isnan(pace_of(finished("mpm", "refused")))
+
+
 def test_what_is_refused_takes_no_time():
-    assert afford._expected(BEAD, "mpm") > 0.1
+    assert afford.expected(BEAD, "mpm") > 0.1
     solid = BEAD.model_copy(update={"material": BEAD.material.model_copy(update={"yield_stress": None})})
-    assert solid.material.is_solid and afford._expected(solid, "pbd") == 0.0
+    assert solid.material.is_solid and afford.expected(solid, "pbd") == 0.0
 
 
 def test_a_study_that_no_method_has_time_for_is_refused(tmp_path):
