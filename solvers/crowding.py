@@ -5,7 +5,8 @@ tensile control of Monaghan (2000) alone. Of SPH and MPM.
     shift_i = -(strain x constant) h^2 crowd_i                                             [m]
 
 Partners push each other alike where both shear alike; a lattice and its free surface feel nothing; what rests, flies or
-turns does not shear.
+turns does not shear. Where there is no such surface the gradient of the concentration, sum_j V_j grad W, may be added,
+which evens out what lies unevenly.
 """
 
 import warp as wp

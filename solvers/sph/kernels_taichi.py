@@ -9,7 +9,7 @@ from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC
 
 from ..aging import DISORDER
-from ..corrected import EDGE, SOUND
+from ..corrected import EDGE, INSIDE, LEANING, SOUND
 from ..corrected_taichi import (
     elastic_stress,
     from_before,
@@ -56,7 +56,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_warp import STATE
-from .particle import WHOLE, Smoothing
+from .particle import GROWN, WHOLE, Smoothing
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
 kernel = taichi_func(wendland)
@@ -151,13 +151,12 @@ def rubbed(box, x, v, inward_pull, walls, h):
 
 
 @ti.func
-def drifted(num, phase, rho, rest, second, first_moment):
+def drifted(num, phase, rho, rest, grown, second, first_moment):
     """What is summed beyond what is integrated, where the neighbourhood is whole or too crowded: see particle.py."""
     drift = second * num.lattice / 3.0 - rho
     whole = 1.0
     if drift <= 0.0:
         whole = ti.max(1.0 - first_moment.norm() * num.h / (WHOLE * rho), 0.0)
-    grown = rest < 0.99 * phase.density
     tolerance = num.density_tolerance
     if grown:
         tolerance = ti.max(tolerance, DISORDER)
@@ -242,9 +241,10 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 if ti.static(changing):
                     rest = own[11]
                     sound *= ti.sqrt(phase.density / rest)
+                grown = rest < GROWN * phase.density
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
-                second, approach, sheared, alone, flows, h = 0.0, 0.0, 0.0, 0.0, True, dt[world]
+                second, approach, sheared, alone, least, flows, h = 0.0, 0.0, 0.0, 0.0, 0.0, True, dt[world]
                 gradient, correction, span = mat3(0.0), mat3(0.0), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
                 if ti.static(strength):
@@ -277,9 +277,11 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
                 inflow, crowd = approach, vector_at(sums, 4) / rho
                 if flows and not is_solid(phase):
-                    inflow += (
-                        num.density_feedback * sound / num.h * drifted(num, phase, rho, rest, second, first_moment)
-                    )
+                    if ti.static(strength and changing):
+                        enclosed = ti.math.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
+                        crowd += grown * enclosed / rho * first_moment
+                    drift = drifted(num, phase, rho, rest, grown, second, first_moment)
+                    inflow += num.density_feedback * sound / num.h * drift
                     inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)

@@ -10,7 +10,7 @@ from fluidbench.native.scene import Phase
 
 from ..aging import DISORDER
 from ..bind import warp_func
-from ..corrected import EDGE, SOUND
+from ..corrected import EDGE, INSIDE, LEANING, SOUND
 from ..smoothing import wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -18,6 +18,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 slope = warp_func(wendland_slope)
 
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
+GROWN = wp.constant(0.99)  # of the fresh density, below which matter has grown and split
 
 
 @wp.struct
@@ -57,6 +58,18 @@ def straggling(least: float):
 
 
 @wp.func
+def enclosed(least: float):
+    """How far a particle is from any free surface [-], by the least eigenvalue of its moment: 1 where it has neighbours
+    all round, 0 from halfway to a face on. (Marrone et al. 2010, J. Comput. Phys. 229:3652, tell surfaces by it.)
+
+    What has grown is evened out there. The halves of split particles lie as they were born, and no stress says where
+    they should: a kernel three spacings wide does not see how far above a floor a row is. Nothing held the lowest row
+    of rising foam down; a gap of half a spacing opened under it, and the foam slid off.
+    """
+    return wp.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
+
+
+@wp.func
 def broken(crowd: wp.vec3, limit: float):
     """What crowds a particle of matter that does not flow [1/m]: the excess over what one partner does at 0.6 d, nearer
     than any elastic strain brings them. A lattice that is pressed together keeps its order by itself."""
@@ -64,7 +77,7 @@ def broken(crowd: wp.vec3, limit: float):
 
 
 @wp.func
-def drifted(num: Smoothing, phase: Phase, rho: float, rest: float, second: float, first_moment: wp.vec3):
+def drifted(num: Smoothing, phase: Phase, rho: float, rest: float, grown: bool, second: float, first_moment: wp.vec3):
     """By how much the density that particles really have exceeds the one that they integrate, rho [kg/m^3].
 
     Taken from the second moment where the neighbourhood is complete (it leans to no side), or too crowded for any; what
@@ -75,10 +88,10 @@ def drifted(num: Smoothing, phase: Phase, rho: float, rest: float, second: float
     if drift > 0.0:
         whole = 1.0
     tolerance = float(num.density_tolerance)
-    if rest < 0.99 * phase.density:
+    if grown:
         tolerance = wp.max(tolerance, DISORDER)
     drift = wp.sign(drift) * wp.max(wp.abs(drift) - tolerance * rho, 0.0)
-    if phase.relaxation_rate > 0.0 or rest < 0.99 * phase.density:
+    if phase.relaxation_rate > 0.0 or grown:
         # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and would be
         # pulled closer
         drift = wp.max(drift, wp.min(rest - rho, 0.0))

@@ -24,7 +24,7 @@ from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import STATE
-from .particle import Smoothing, broken, drifted, pulled_back, slope, straggling
+from .particle import GROWN, Smoothing, broken, drifted, enclosed, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -136,9 +136,10 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         phase = data.phases[world, data.phase_of[i]]
         h = data.dt[world]
         rho = own[7]
-        rest, sound = float(phase.density), float(phase.wave_speed)
+        rest, sound, grown = float(phase.density), float(phase.wave_speed), bool(False)
         if wp.static(changing):
             rest = own[11]
+            grown = rest < GROWN * phase.density
             sound = phase.wave_speed * wp.sqrt(phase.density / rest)
         if wp.static(tooled):
             sums = into_tool(data.tool, own, sums)
@@ -186,13 +187,16 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             second = sums[7]
             inflow = sums[8]
             strain = h * wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
-        crowd /= rho
         flows = flows and not is_solid(phase)
+        if wp.static(strength and changing):
+            if grown and flows:
+                crowd += enclosed(least) * first_moment
+        crowd /= rho
         if not flows:
             crowd = broken(crowd, num.broken)
         data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * strain)
         if flows:
-            drift = drifted(num, phase, rho, rest, second, first_moment)
+            drift = drifted(num, phase, rho, rest, grown, second, first_moment)
             inflow += num.density_feedback * sound / num.h * drift
             inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
         rho += h * inflow
