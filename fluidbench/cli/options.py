@@ -150,6 +150,29 @@ def running(wall_limit: float) -> Callable[[Callable[..., None]], Callable[..., 
     return decorate
 
 
+def given(context: typer.Context, name: str) -> bool:
+    """Whether the command line says this parameter."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
+def limited(context: typer.Context, options: Options) -> Options:
+    """The options without a limit of a run that the command line does not say, for a verb that knows a better one."""
+    made = options.copy()
+    if not given(context, "wall_limit"):
+        del made["wall_limit"]
+    return made
+
+
+def alone(context: typer.Context, option: str, *fine: str) -> None:
+    """Raise UserError for what the command line says beside an option that runs nothing, but for --out and what is
+    `fine`."""
+    others = [p for p in context.command.params if p.name and given(context, p.name)]
+    names = [max(p.opts, key=len) for p in others if p.name not in (option, "out", *fine)]
+    if names:
+        raise UserError(f"--{option.rstrip('_')} runs nothing, and goes without {', '.join(names)}")
+
+
 def placed(options: Options, default: str) -> Options:
     """The options with the output folder's default filled in."""
     return {**options, "out": Path(options.get("out") or Path("fluidbench-out") / default)}

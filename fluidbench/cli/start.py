@@ -1,5 +1,6 @@
 """init: a first scenario of one's own, by five questions."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -43,8 +44,9 @@ def init(
         answers[question.key] = answer
         if question.key == "material":
             suits = suited(answer)
-    write_atomically(file, scenario_text(answers, str(file)))
+    write_atomically(file, scenario_text(answers, shlex.quote(str(file))))
     typer.echo(f"written: {file}")
     for line in outlook(load(file)):
         typer.echo(line)
-    typer.echo(f"next: fluidbench show {file} --path; fluidbench compare {file}; fluidbench select {file} --within 6m")
+    name = shlex.quote(str(file))
+    typer.echo(f"next: fluidbench show {name} --path; fluidbench compare {name}; fluidbench select {name} --within 6m")

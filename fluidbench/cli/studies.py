@@ -4,7 +4,6 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import UserError
 from .app import app, finish
 from .options import (
     From,
@@ -17,10 +16,12 @@ from .options import (
     Solvers,
     Spacing,
     Within,
+    alone,
     axes_of,
     budget_of,
     count_of,
     fraction,
+    limited,
     load_scenario,
     methods_in,
     names_in,
@@ -146,6 +147,7 @@ def ablate(
 @app.command()
 @running(wall_limit=900.0)
 def select(
+    context: typer.Context,
     scenario: ScenarioName,
     tolerance: Annotated[str, typer.Option(help="largest relative error of any length, e.g. 5%")] = "5%",
     budget: Annotated[str | None, typer.Option(help="wall time of a run, e.g. 60s, or realtime; default none")] = None,
@@ -167,7 +169,7 @@ def select(
 
     resolved, share = load_scenario(scenario, set_, spacing, quick), fraction(tolerance)
     longest, pace = budget_of(budget)
-    more = placed(options, f"select-{resolved.name}")
+    more = placed(limited(context, options), f"select-{resolved.name}")
     chosen = study(
         resolved,
         methods_in(solvers),
@@ -185,6 +187,7 @@ def select(
 @app.command()
 @running(wall_limit=900.0)
 def guide(
+    context: typer.Context,
     scenarios: Annotated[
         list[str] | None, typer.Argument(help="scenarios, by name or as TOML files; default one for each job")
     ] = None,
@@ -208,13 +211,10 @@ def guide(
 
     shares = [fraction(text) for text in names_in(tolerance, "--tolerance", "tolerance")]
     if from_ is not None:
-        if scenarios or solvers or within or quick:
-            raise UserError(
-                "--from chooses again from what is kept: it takes no scenarios, --solvers, --within or --quick"
-            )
+        alone(context, "from_", "tolerance")
         finish(published(from_, shares, placed(options, "guide-published").get("out")))
         return
-    more = placed(options, "guide")
+    more = placed(limited(context, options), "guide")
     limit = within_of(within)
     finish(study(scenarios or None, methods_in(solvers), tolerances=shares, quick=quick, within=limit, **more))
 
@@ -222,6 +222,7 @@ def guide(
 @app.command()
 @running(wall_limit=3600.0)
 def table1(
+    context: typer.Context,
     scenario: ScenarioName = "line_bead",
     from_: From = None,
     repeats: Annotated[int, typer.Option(min=2, help="runs of each method on the scenario, for the spread")] = 3,
@@ -240,6 +241,7 @@ def table1(
     from ..paper.table1 import table1 as study
 
     if from_ is not None:
+        alone(context, "from_")
         finish(published(from_, placed(options, "table1-published").get("out")))
         return
 
@@ -252,6 +254,7 @@ def table1(
 @app.command()
 @running(wall_limit=1800.0)
 def table2(
+    context: typer.Context,
     solvers: Solvers = "mpm",
     from_: From = None,
     pools: Annotated[str, typer.Option(help="pool sizes to preallocate; `fit` is as many as needed")] = "fit,298000",
@@ -274,6 +277,7 @@ def table2(
     from ..paper.table2 import table2 as study
 
     if from_ is not None:
+        alone(context, "from_")
         finish(published(from_, placed(options, "table2-published").get("out")))
         return
     sizes = [None if part == "fit" else count_of(part, "--pools") for part in names_in(pools, "--pools", "pool")]

@@ -72,20 +72,20 @@ def of_other_code(studies: Mapping[str, Iterable[Run]]) -> list[str]:
     records = [r for own in made.values() for r in own]
     if not records:
         return []
-    newest = max(records, key=lambda r: r.machine.get("time", ""))
+    newest = max(records, key=_time)
     lines = []
     for label, own in made.items():
         other = [r for r in own if r.code["sources"] != newest.code["sources"]]
         if other:
             share = "was" if len(other) == len(own) else "was in part"
-            lines.append(
-                f"{label} {share} made by other code ({_day(other[-1])}) than the newest here ({_day(newest)})"
-            )
+            then, now = _time(max(other, key=_time)), _time(newest)
+            long = len("2026-11-25") if then[:10] != now[:10] else len("2026-11-25 14:11")
+            lines.append(f"{label} {share} made by other code ({then[:long]}) than the newest here ({now[:long]})")
     return lines
 
 
-def _day(record: Record) -> str:
-    return record.machine.get("time", "at an unknown time")[:10]
+def _time(record: Record) -> str:
+    return record.machine.get("time", "").replace("T", " ")
 
 
 def places(folder: Path, name: str, verb: str) -> list[Path]:

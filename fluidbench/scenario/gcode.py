@@ -18,6 +18,7 @@ from ..errors import quoted
 COMMAND = re.compile(r"([GMT])(\d+(?:\.\d+)?)(?=\W|[A-Z]|$)(.*)", re.DOTALL)
 NUMBER = r"([+-]?(?:\d+\.?\d*|\.\d+))"
 WORDS = re.compile(rf"(?:\s*[A-Z]\s*{NUMBER}?(?=[\sA-Z]|$))*\s*")
+NUMBERED = re.compile(rf"(?:\s*[A-Z]\s*{NUMBER})+\s*")
 WORD = re.compile(rf"([A-Z])\s*{NUMBER}?")
 COMMENT = re.compile(r"\([^)]*\)|;.*")
 ENVELOPE = re.compile(r"^\s*(?:N\d+\s*)?(.*?)\s*(?:\*\d+)?\s*$", re.DOTALL)  # line number, checksum
@@ -78,7 +79,8 @@ def understand(text: str, name: str = "G-code") -> Program:
         code = "" if found is None else found[1].strip()
         if code and code != "%":
             try:
-                _obey(machine, code.upper(), number)
+                for command in _commands(code.upper()):
+                    _obey(machine, command, number)
             except ValueError as error:
                 raise ValueError(f"{name}, line {number}: {error}") from None
     if not machine.moves:
@@ -88,8 +90,14 @@ def understand(text: str, name: str = "G-code") -> Program:
     return Program(points, table[:, 3], table[:, 4], table[:, 5], table[:, 6] > 0, machine.ignored)
 
 
+def _commands(code: str) -> list[str]:
+    """The commands of a line, in its order, where all of it is words such as X10.5; else the line, whose text may be
+    anything (M117)."""
+    return [part for part in re.split(r"(?=[GMT]\s*\d)", code) if part] if NUMBERED.fullmatch(code) else [code]
+
+
 def _obey(m: _Machine, code: str, number: int) -> None:
-    """One line, without comments and in capitals."""
+    """One command, without comments and in capitals."""
     found = COMMAND.fullmatch(code)
     if found is None:
         if re.fullmatch(rf"(?:[XYZEF]\s*{NUMBER}\s*)+", code):
@@ -106,6 +114,8 @@ def _obey(m: _Machine, code: str, number: int) -> None:
     if not WORDS.fullmatch(found[3]):
         raise ValueError(f"{quoted(found[3].strip())} are no words such as X10.5")
     words = {letter: None if value == "" else float(value) for letter, value in WORD.findall(found[3])}
+    if second := [letter for letter in words if letter in "GMT"]:
+        raise ValueError(f"{name} and a second command, {second[0]}, beside words without a number; write two lines")
     if strange := [letter for letter in words if letter not in LETTERS.get(name, words)]:
         raise ValueError(f"{name} has no word {quoted(strange[0])}; it has {', '.join(LETTERS[name])}")
     if name in MODES:

@@ -40,6 +40,8 @@ def _data(folder: str, suffix: str) -> list[Path]:
 
 def find(reference: str | Path) -> Path:
     """The file meant by a path or by the name of a shipped scenario."""
+    if not isinstance(reference, str | Path):
+        raise UserError(f"a scenario's name or its file is wanted (got {quoted(reference)})")
     known, path = shipped(), Path(reference)
     try:
         there, is_file = path.exists(), path.is_file()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
-import io
 import re
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,6 +20,7 @@ ALONG = {"bead_width_m": "width", "bead_height_m": "height", "bead_area_m2": "ar
 OF_A_LAYER = ("level_m", "width_m", "radius_m", "height_m", "drift_m")
 OF_ALL = (*ALONG, "top_m", "print_height_m", "slump", "spread_radius_m", "front_x_m", "height_m", "ring_drift_m")
 SHORT = {"width": "bead_width_m", "height": "bead_height_m", "area": "bead_area_m2"}
+SIGNED = ("front_x_m",)  # places, not sizes
 COLUMNS = ("quantity", "layer", "place", "value", "uncertainty", "source")
 MOST_ROWS = 10_000
 
@@ -47,6 +49,8 @@ class Measured(Model):
     def _known(self) -> Measured:
         if self.place is not None and self.key not in ALONG:
             raise ValueError(f"place: only {', '.join(SHORT)} without a layer are known along the path")
+        if self.value < 0.0 and self.key not in SIGNED:
+            raise ValueError(f"value: {self.words} is a size, and not below 0 (got {self.value:g})")
         return self
 
     @property
@@ -89,22 +93,35 @@ def read(path: str | Path) -> tuple[Measured, ...]:
         text = Path(path).read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
         raise UserError(f"{quoted(str(path))}: {getattr(error, 'strerror', None) or error}") from None
-    lines = text.splitlines()
-    kept = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
+    kept = list(_lines(text, path))
     if not kept:
         raise UserError(f"{path}: no rows; the first line names columns of {', '.join(COLUMNS)}")
     if len(kept) > MOST_ROWS:
         raise UserError(f"{path}: {len(kept)} rows; {MOST_ROWS} at most")
-    head, *rows = csv.reader(io.StringIO("\n".join(line for _, line in kept)), skipinitialspace=True)
-    head = [name.strip().lower() for name in head]
+    (first, names), *rows = kept
+    head = [name.strip().lower() for name in names]
     for name in head:
         if name not in COLUMNS:
-            raise UserError(f"{path}, line {kept[0][0]}: no column is called {quoted(name)}{suggestion(name, COLUMNS)}")
+            raise UserError(f"{path}, line {first}: no column is called {quoted(name)}{suggestion(name, COLUMNS)}")
+        if head.count(name) > 1:
+            raise UserError(f"{path}, line {first}: the column {name} is there twice")
     if missing := [name for name in ("quantity", "value") if name not in head]:
-        raise UserError(f"{path}, line {kept[0][0]}: the column {missing[0]} is missing")
+        raise UserError(f"{path}, line {first}: the column {missing[0]} is missing")
     if not rows:
         raise UserError(f"{path}: it names columns and has no rows")
-    return tuple(_row(head, row, f"{path}, line {number}") for (number, _), row in zip(kept[1:], rows, strict=True))
+    return tuple(_row(head, row, f"{path}, line {number}") for number, row in rows)
+
+
+def _lines(text: str, path: str | Path) -> Iterator[tuple[int, list[str]]]:
+    """Rows that are neither empty nor a comment (#), each with the number of its first line."""
+    lines = enumerate(text.splitlines(keepends=True), 1)
+    for number, line in lines:
+        if line.strip() and not line.lstrip().startswith("#"):
+            rest = (more for _, more in lines)  # of a quoted cell of several lines
+            try:
+                yield number, next(csv.reader(chain([line], rest), skipinitialspace=True, strict=True))
+            except csv.Error as error:
+                raise UserError(f"{path}, line {number}: {error}") from None
 
 
 def _row(head: list[str], row: list[str], where: str) -> Measured:

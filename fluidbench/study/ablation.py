@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -183,8 +184,10 @@ def _clash(candidate: Effect, chosen: Sequence[Effect]) -> bool:
 def command(scenario: str, given: Sequence[str], seen: Effect) -> str:
     """The command that runs a lean mix alone, on top of the settings given (key=value)."""
     own = [text for text in given if text.split("=")[0].strip() not in seen.change.settings]
-    sets = " ".join(f"--set {text}" for text in [*own, *(f"{k}={_toml(v)}" for k, v in seen.change.settings.items())])
-    return f"fluidbench run {scenario} --solver {seen.method}{seen.run.target.alone} {sets}"
+    sets = " ".join(
+        f"--set {shlex.quote(text)}" for text in [*own, *(f"{k}={_toml(v)}" for k, v in seen.change.settings.items())]
+    )
+    return f"fluidbench run {shlex.quote(scenario)} --solver {seen.method}{seen.run.target.alone} {sets}"
 
 
 def _toml(value: Any) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from ..errors import UserError
 from ..runs.record import Record, Run
 from ..scenario.library import load, shipped
 
@@ -18,13 +20,15 @@ def command_of(run: Run) -> str | None:
     return f"fluidbench run {run.record.scenario} --solver {run.method}{settings}{run.target.alone}"
 
 
-def settings_of(record: Record) -> str | None:
-    """What the scenario of a run has otherwise than the shipped one of its name, as ` --set key=value ...`; None where
-    there is none of that name, or no words for it."""
-    if record.scenario not in shipped() or record.input is None:
+def settings_of(record: Record, called: str = "", apart: tuple[str, ...] = ()) -> str | None:
+    """What the scenario of a run has otherwise than the one that is `called` so, a shipped name or a file (default the
+    shipped one of its own name), as ` --set key=value ...`, some keys `apart`; None where there is no such scenario, or
+    no words for it."""
+    base = _whole(called or record.scenario)
+    if base is None or record.input is None:
         return None
-    base, own = _flat(_shipped(record.scenario)), _flat(record.input)
-    changed = {key: own.get(key) for key in {**base, **own} if base.get(key) != own.get(key)}
+    own = _flat(record.input)
+    changed = {key: own.get(key) for key in {**base, **own} if base.get(key) != own.get(key) and key not in apart}
     if any(isinstance(value, list) and any(isinstance(v, dict) for v in value) for value in changed.values()):
         return None  # a list of tables has no words on a command line
     return "".join(f" --set {key}={_written(value)}" for key, value in changed.items())
@@ -32,13 +36,22 @@ def settings_of(record: Record) -> str | None:
 
 def _written(value: Any) -> str:
     """A value as the command line takes it."""
-    text = "none" if value is None else str(value)
-    return f"'{text}'" if " " in text else text
+    return shlex.quote("none" if value is None else str(value))
+
+
+def _whole(called: str) -> dict[str, Any] | None:
+    """Dotted keys and values of a scenario, not of its quick version; None where there is none."""
+    if called in shipped():
+        return _shipped(called)
+    try:
+        return _flat(load(called).model_dump(mode="json"))
+    except UserError:
+        return None
 
 
 @cache
 def _shipped(name: str) -> dict[str, Any]:
-    return load(name).model_dump(mode="json")
+    return _flat(load(name).model_dump(mode="json"))
 
 
 def _flat(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..runs.experiment import CRASH, Experiment
 from .bench_report import report
 from .result import Result
 from .speed import speed_tasks
-from .workplace import Options, Workplace, methods_of, require_number
+from .workplace import Options, Workplace, methods_of, names_of, require_number
 
 WALL_LIMIT = 600.0  # s
 SIDES = {"cpu": (13, 26), "cuda": (26, 67)}  # particles along an edge of a block
@@ -72,7 +72,7 @@ def sides_of(particles: Sequence[int] | None, target: Target) -> list[int]:
     """Particles along an edge of each block; raises UserError for a number that is none."""
     if particles is None:
         return list(SIDES["cpu" if target.device == "cpu" else "cuda"])
-    for number in particles:
+    for number in names_of(particles, "particles") or []:
         require_number(number, "particles", 216, whole=True)
         if number > LARGEST:
             raise UserError(f"particles: at most {LARGEST} (got {number})")

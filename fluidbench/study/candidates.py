@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import median
 
-from ..errors import UserError
+from ..errors import Obstacle, UserError
 from ..runs.job import Job
 from ..runs.record import Run
 from ..scenario import Scenario
@@ -38,8 +38,8 @@ def run_candidates(
     """For each subject every method at the spacings that its scenario can have, run; where the whole study has so much
     time [s], finer or coarser, by what one run of each method takes here.
 
-    Raises UserError for a scenario that cannot be tried at ENOUGH spacings, for a time on a GPU, and where the time is
-    not enough for any method: by what it is estimated to take before anything is run, or by what it took.
+    Raises UserError, before anything is run, for a scenario that cannot be tried at ENOUGH spacings, for a time on a
+    GPU, and for one that is not enough for any method by the estimate; Obstacle where it is not by what a run took.
     """
     together = shares_cores(place)
     found = candidates(subjects, methods, place, within)
@@ -80,13 +80,21 @@ def candidates(
         usual = median(paces.values()) if paces else 1.0
         made = afford(pairs, factors, seconds, [paces.get(one, usual) for one in wanted])
         if not any(made):
-            raise UserError(f"within {within:g} s no method can compute {ENOUGH} spacings of {' or '.join(subjects)}")
-        place = replace(place, wall_limit=max(place.wall_limit, within))
+            told = f"within {within:g} s no method can compute {ENOUGH} spacings of {' or '.join(subjects)}"
+            if trials:
+                raise Obstacle(f"{told}: they take {usual:.2g} times as long here as estimated; ask for more time")
+            raise UserError(told)
     found = {name: Candidates([], [], []) for name in subjects}
     for (name, method), (scenario, _), finer in zip(wanted, pairs, made, strict=True):
         found[name].jobs += [_job(s, method, place) for s in finer]
         found[name].untried += _untried(scenario, method, factors, finer)
     return found
+
+
+def limit_within(within: float) -> float:
+    """How long a run may take where nothing else is said [s]. Raises UserError for a study's time that is none."""
+    require_number(within, "within", 1.0, high=math.inf)
+    return WALL_LIMIT if math.isinf(within) else max(WALL_LIMIT, within)
 
 
 def shares_cores(place: Workplace) -> bool:
@@ -109,7 +117,6 @@ def expected_of(job: Job) -> float:
 
 def _time(place: Workplace, within: float, trials: Mapping[tuple[str, str], Run]) -> float:
     """Time of cores [s] that is left of a study's."""
-    require_number(within, "within", 1.0)
     if place.target.device != "cpu":
         raise UserError("within: time is estimated for a CPU alone")
     busy = min(place.workers, cores()) if shares_cores(place) else place.target.threads

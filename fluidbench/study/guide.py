@@ -13,7 +13,7 @@ from ..method.verdict import lacking
 from ..runs import archive
 from ..runs.record import Run
 from ..scenario import Scenario
-from .candidates import WALL_LIMIT, run_candidates
+from .candidates import limit_within, run_candidates
 from .guide_report import report
 from .result import Result
 from .selection import Selection, Trust, assess
@@ -59,11 +59,11 @@ def guide(
     named; `methods` are names, default all; `tolerances`: largest relative errors of any length; `within`: time [s]
     that all of it may take on a CPU, as in `select`. `options` are those of every verb, see Options.
 
-    Raises UserError for what cannot be run, before anything is.
+    Raises UserError for what cannot be run, before anything is; Obstacle where `within` proves too short.
     """
     wanted = tolerances_of(tolerances)
     names = methods_of(methods, options)
-    place = Workplace.of(options, WALL_LIMIT, names)
+    place = Workplace.of(options, limit_within(within), names)
     subjects = subjects_of(scenarios, quick)
     tried = run_candidates(subjects, names, place, "guide", within)
     jobs = {

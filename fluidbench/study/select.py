@@ -10,7 +10,7 @@ from typing import Unpack
 
 from ..scenario import Scenario
 from ..scenario.measured import Measured
-from .candidates import WALL_LIMIT, run_candidates
+from .candidates import limit_within, run_candidates
 from .result import Result
 from .select_report import report
 from .selection import Selection, assess
@@ -45,11 +45,13 @@ def select(
     `within`: time [s] that the study may take on a CPU: spacings are so much finer or coarser, method by method, by
     what a run of each takes here. `options` are those of every verb, see Options.
 
-    Raises UserError for what cannot be run, before anything is.
+    Raises UserError for what cannot be run, before anything is; Obstacle where `within` proves too short.
     """
     require_number(tolerance, "tolerance", 1e-6)
+    for value, what in ((budget, "budget"), (pace, "pace")):
+        require_number(value, what, 0.0, high=math.inf)
     resolved, names = as_scenario(scenario), methods_of(methods, options)
-    place = Workplace.of(options, WALL_LIMIT, names)
+    place = Workplace.of(options, limit_within(within), names)
     beside = measured_of(resolved, measured)
     (tried,) = run_candidates({resolved.name: resolved}, names, place, "select", within).values()
     found = assess(resolved, names, tried.runs, beside, tried.untried)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,7 +11,8 @@ from ..report.plot import Plot, Trace, colour
 from ..report.report import Report, machine_of, record_link
 from ..report.table import Table, number, readable
 from ..scenario import Scenario
-from .selection import Candidate, Selection, confidence, physics_of
+from .again import settings_of
+from .selection import FALLS, Candidate, Selection, confidence, physics_of
 
 GREY = "#bbbbbb"
 
@@ -60,8 +62,7 @@ def _findings(
     trust = chosen.trust.get(best.method)
     if trust is not None and not trust.trusted:
         lines.append(f"Beware: {best.method} passes {trust.passed} of {trust.judged} known answers of this physics.")
-    spacing = f"{1e3 * best.spacing:.6g}mm"
-    lines.append(f"Run it: fluidbench run {name} --solver {best.method} --spacing {spacing}{best.run.target.alone}")
+    lines.append(f"Run it: {_command(name, best)}")
     finer = [c for c in chosen.candidates if c.error <= best.error / 2]
     faster = [c for c in chosen.candidates if c.seconds <= best.seconds / 2]
     if finer:
@@ -79,12 +80,21 @@ def _findings(
     return [*lines, *chosen.remarks]
 
 
+def _command(name: str, best: Candidate) -> str:
+    """The command that runs a setting of the scenario called so; in Python where no command line says it."""
+    settings = settings_of(best.run.record, name, apart=("spacing",))
+    if settings is None:
+        return f"fluidbench.run(scenario.replace(spacing={best.spacing:.6g}), {best.method!r}) of the scenario given"
+    how = f"--solver {best.method} --spacing {1e3 * best.spacing:.6g}mm{settings}{best.run.target.alone}"
+    return f"fluidbench run {shlex.quote(name)} {how}"
+
+
 def _further(chosen: Selection, best: Candidate) -> str:
     """What half the error would take, where the errors tried say so."""
     if not chosen.converges(best.method):
         return f"the error of {best.method} does not fall with the spacing, so a finer one promises nothing"
     order = chosen.order(best.method)
-    if not math.isfinite(order):
+    if not order > FALLS:  # too small to fall
         return f"the error of {best.method} is nothing but what cannot be measured"
     factor = 2.0 ** (1.0 / order)
     return (

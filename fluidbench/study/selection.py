@@ -142,6 +142,7 @@ def physics_of(scenario: Scenario) -> set[str]:
     """The classes of known answers that the scenario's material and process belong to."""
     m = scenario.material
     classes = {"emission"} if scenario.nozzle is not None else set()
+    classes |= {"process"} if m.expansion is not None or m.cure is not None else set()
     if m.relaxation_time is not None:
         return classes | {"viscoelastic"}
     if m.is_solid:

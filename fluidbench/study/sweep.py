@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Unpack
 
+import numpy as np
+
 from ..errors import UserError, quoted
 from ..method.verdict import Evidence, Verdict, evidence_of, lacking
 from ..registry import get_method
@@ -102,7 +104,10 @@ def points_of(scenario: Scenario, over: Axes) -> list[tuple[dict[str, Any], Scen
     scenario does not have, for none and for too many."""
     if not isinstance(over, Mapping) or not over:
         raise UserError("over: a key and its values are wanted, as material.yield_stress=20:200:5")
+    over = {key: values.tolist() if isinstance(values, np.ndarray) else values for key, values in over.items()}
     for key, values in over.items():
+        if not isinstance(key, str):
+            raise UserError(f"over: keys are names such as material.yield_stress (got {quoted(key)})")
         if isinstance(values, str | bytes) or not isinstance(values, Sequence) or not values:
             raise UserError(f"over: {quoted(key)[1:-1]}: a list of values is wanted (got {quoted(values)})")
         if len({str(value) for value in values}) < len(values):

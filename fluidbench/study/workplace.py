@@ -145,6 +145,9 @@ def as_scenario(given: Scenario | str | Path, quick: bool = False) -> Scenario:
 
 def measured_of(scenario: Scenario, more: str | Path | Sequence[Measured]) -> tuple[Measured, ...]:
     """What was measured: what the scenario has, and a table in a file, or rows of one."""
+    rows = isinstance(more, Sequence) and all(isinstance(one, Measured) for one in more)
+    if not rows and not isinstance(more, str | Path):
+        raise UserError(f"measured: a file, or rows of one, are wanted (got {quoted(more)})")
     return (*scenario.measured, *(read_measured(more) if isinstance(more, str | Path) else more))
 
 

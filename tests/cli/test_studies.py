@@ -34,6 +34,19 @@ def test_stability_measures_holds_and_resumes(stability):
     assert second.stdout == first.stdout
 
 
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [
+        (["table1", "foam_tower", "--seed", "5"], "scenario, --seed"),
+        (["table2", "--variants", "plain"], "--variants"),
+        (["guide", "--quick", "--tolerance", "5%"], "--quick"),
+    ],
+)
+def test_what_runs_nothing_refuses_what_would_have_no_effect(tmp_path, command, names):
+    done = fluidbench(*command, "--from", str(tmp_path))
+    assert done.returncode == 2 and f"--from runs nothing, and goes without {names}" in done.stderr
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
 def test_the_page_opens_without_a_network_or_an_error(stability, tmp_path):
     out, *_ = stability

@@ -18,7 +18,7 @@ def test_studies_of_other_code_than_the_newest_are_named():
     }
     assert of_other_code(studies) == [
         "CPU was made by other code (2026-11-24) than the newest here (2026-11-25)",
-        "H200 was in part made by other code (2026-11-25) than the newest here (2026-11-25)",
+        "H200 was in part made by other code (2026-11-25 10:00) than the newest here (2026-11-25 11:00)",
     ]
 
 

@@ -50,6 +50,11 @@ def test_units_and_modes():
         assert program.seconds.sum() == pytest.approx(time), text
 
 
+@pytest.mark.parametrize("text", ["G90 G20 G1 X1 Y0 Z0 F60 E1", "N7 G20G90G1X1Y0Z0F60E1"])
+def test_a_line_may_have_several_commands(text):
+    assert gcode.understand(text).points[-1] == pytest.approx([0.0254, 0, 0])
+
+
 def test_extrusion_absolute_relative_and_drawn_back():
     absolute = gcode.understand("G1 F600\nG1 X1 E2\nG1 X2 E3\nG92 E0\nG1 X3 E4")
     assert absolute.fed.tolist() == [2, 1, 4]
@@ -99,6 +104,7 @@ def test_an_arc_may_rise():
         ("G1 F600\nG2 X10 R1", "R is shorter"),
         ("G1 F600\nM200 D1.75", "E is a volume"),
         ("G1 F600\nG4 S-1", "less than nothing"),
+        ("G28 X G1 X5 F600", "a second command, G"),
         ("; nothing", "no line of it moves anything"),
     ],
 )

@@ -59,11 +59,19 @@ def test_rows_with_units_layers_and_places(tmp_path):
         ("quantity,value,layer\nslump,1,2\n", "no measure of a layer is called 'slump'"),
         ("quantity,value,place\nslump,1,2\n", "place: only width, height, area without a layer"),
         ("quantity,value\nwidth,\n", "line 2: value: field required"),
+        ("quantity,value\nwidth,-4 mm\n", "line 2: value: bead width is a size, and not below 0"),
+        ("quantity,value,value\nwidth,1,2\n", "line 1: the column value is there twice"),
+        ('quantity,value,source\nwidth,1,"us\n', "line 2: unexpected end of data"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_line(tmp_path, text, words):
     with pytest.raises(UserError, match=words):
         written(tmp_path, text)
+
+
+def test_a_cell_may_have_several_lines(tmp_path):
+    rows = written(tmp_path, 'quantity,value,source\nwidth,1,"us,\n\n# in May"\n# "\nheight,2,\n')
+    assert [(one.key, one.source) for one in rows] == [("bead_width_m", "us,\n\n# in May"), ("bead_height_m", "")]
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):

@@ -6,12 +6,12 @@ import math
 import pandas as pd
 import pytest
 
-from fluidbench.errors import UserError
+from fluidbench.errors import Obstacle, UserError
 from fluidbench.measure.reference import Answer
 from fluidbench.method.target import Target
 from fluidbench.scenario.library import load
 from fluidbench.study import selection as module
-from fluidbench.study.candidates import candidates, pace_of, run_candidates
+from fluidbench.study.candidates import candidates, limit_within, pace_of, run_candidates
 from fluidbench.study.fit import extrapolate
 from fluidbench.study.select import select
 from fluidbench.study.selection import (
@@ -426,7 +426,9 @@ def test_a_trial_of_what_there_is_no_time_for_is_no_evidence(tmp_path, monkeypat
     costing(monkeypatch, **cost)
     slow(cost, {"sph": 1e7, "pbd": 0.1}, monkeypatch)
     place = workplace_in(tmp_path, workers=1, progress=False)
-    with pytest.raises(UserError, match="within 300 s no method can compute 3 spacings"):
+    with pytest.raises(
+        Obstacle, match=r"within 300 s no method can compute 3 spacings of bead: they take 1e\+07 times"
+    ):
         run_candidates({"bead": BEAD}, ["sph"], place, "select", 300.0)
     monkeypatch.setattr(planning, "_time", lambda *_: 300.0)
     own = run_candidates({"bead": BEAD}, ["sph", "pbd"], place, "select", 300.0)["bead"]
@@ -451,5 +453,19 @@ def test_what_is_refused_takes_no_time():
 def test_a_study_that_no_method_has_time_for_is_refused(tmp_path):
     with pytest.raises(UserError, match=r"within 1 s no method can compute 3 spacings of line_bead"):
         select(BEAD, "mpm", within=1.0, out=tmp_path, progress=False)
-    with pytest.raises(UserError, match="within: a number of at least 1 is wanted"):
-        select(BEAD, "mpm", within=0.1, out=tmp_path, progress=False)
+    for wrong in (0.1, "5m"):
+        with pytest.raises(UserError, match="within: a number of at least 1 is wanted"):
+            select(BEAD, "mpm", within=wrong, out=tmp_path, progress=False)
+    for name, wrong in (("budget", "60s"), ("budget", -1.0), ("pace", math.nan)):
+        with pytest.raises(UserError, match=f"{name}: a number of at least 0 is wanted"):
+            select(BEAD, "mpm", **{name: wrong}, out=tmp_path, progress=False)
+    with pytest.raises(UserError, match="measured: a file, or rows of one, are wanted"):
+        select(BEAD, "mpm", measured=None, out=tmp_path, progress=False)
+
+
+def test_a_limit_of_a_run_is_what_was_given_or_the_whole_studys_time():
+    assert [limit_within(t) for t in (math.inf, 60.0, 3600.0)] == [900.0, 900.0, 3600.0]
+
+
+def test_what_grows_or_cures_is_judged_by_processes_too():
+    assert physics_of(load("foam_wall")) == {"emission", "yield stress", "process"}

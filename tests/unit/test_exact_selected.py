@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from fluidbench.scenario.library import load, shipped
 from fluidbench.study import select_report as page
 from fluidbench.study.selection import Candidate, Selection, Trust
 
@@ -32,7 +33,7 @@ def test_findings_name_the_best_and_what_twice_would_take():
         "Recommended: mpm at spacing 2000 mm (mean dt 0.0001 s): error 20.0% (discretisation 20.0%, bias 0.0%), 4 s, "
         "40 s per simulated s."
     )
-    assert lines[2] == "Run it: fluidbench run line_bead --solver mpm --spacing 2000mm --threads 1"
+    assert lines[2] == "Run it: fluidbench.run(scenario.replace(spacing=2), 'mpm') of the scenario given"
     assert lines[3].startswith("Twice as accurate: mpm at spacing 1000 mm") and lines[4].startswith(
         "Twice as fast: mpm at spacing 4000 mm"
     )
@@ -64,6 +65,36 @@ def test_what_half_the_error_takes():
     )
     nothing = made((1.0, 8.0, 0.0), (2.0, 4.0, 0.0), (4.0, 2.0, 0.0))
     assert page._further(nothing, nothing.candidates[0]).endswith("nothing but what cannot be measured")
+
+
+@pytest.mark.parametrize("errors", [(0.0056, 0.0057, 0.0058, 0.006), (0.006, 0.0058, 0.0057, 0.0056), (0.005,) * 4])
+def test_an_error_that_is_noise_at_all_spacings_has_no_order(errors):
+    small = made(*((2.0**i, 1.0, e) for i, e in enumerate(errors)))
+    assert small.converges("mpm")
+    assert page._further(small, small.candidates[0]).endswith("nothing but what cannot be measured")
+
+
+def test_the_command_is_of_the_scenario_that_was_asked_for(tmp_path):
+    """With what was set on the command line, be it the quick version; and in Python where a command cannot say it."""
+    file = tmp_path / "a b.toml"
+    file.write_text(shipped()["line_bead"].read_text())
+    one = made((1.0, 8.0, 0.1)).candidates[0]
+
+    def command(scenario, name):
+        change(one.run, input=scenario.replace(spacing=2e-3).model_dump(mode="json"), machine={"cores": "2"})
+        return page._command(name, one)
+
+    start = "fluidbench run line_bead --solver mpm --spacing 1000mm"
+    assert command(load("line_bead"), "line_bead") == f"{start} --threads 1"
+    varied = load("line_bead", {"material.yield_stress": 50})
+    assert command(varied, "line_bead") == f"{start} --set material.yield_stress=50.0 --threads 1"
+    quick = command(load("foam_tower", quick=True), "foam_tower")
+    assert " --set duration=6.6 " in quick and " --set material.expansion.ratio=3.5 " in quick
+    assert command(load(file), str(file)).startswith(f"fluidbench run '{file}' --solver mpm")
+    assert (
+        command(load("line_bead"), "of_mine")
+        == "fluidbench.run(scenario.replace(spacing=1), 'mpm') of the scenario given"
+    )
 
 
 def test_tables_and_plot_of_the_candidates(tmp_path):
