@@ -19,6 +19,7 @@ wp.set_module_options({"enable_backward": False})
 # Offspring lie in no order: the density that a grid or a kernel sum sees fluctuates by a tenth. Corrections that only
 # ever make matter denser must leave that alone: they rectified the noise into 5 to 9 % of volume.
 DISORDER = wp.constant(0.1)
+GROWN = wp.constant(0.99)  # of the fresh density, below which matter has grown and split
 
 relieved = warp_func(constitutive.relieved)
 

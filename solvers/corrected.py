@@ -30,6 +30,18 @@ def least_eigenvalue(m: wp.mat33):
 
 
 @wp.func
+def enclosed(least: float):
+    """How far a particle is from any free surface [-], by the least eigenvalue of its moment: 1 where it has neighbours
+    all round, 0 from halfway to a face on. (Marrone et al. 2010, J. Comput. Phys. 229:3652, tell surfaces by it.)
+
+    What has grown is evened out there (crowding.py). The halves of split particles lie as they were born, and no stress
+    says where they should: a kernel three spacings wide does not see how far above a floor a row is. Nothing held the
+    lowest row of rising foam down; a gap of half a spacing opened under it, and the foam slid off.
+    """
+    return wp.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
+
+
+@wp.func
 def symmetric_inverse(m: wp.mat33):
     """Inverse of a moment matrix; where too few neighbours make it ill-conditioned, m (m^2 + SOUND^2)^-1 (Tikhonov),
     which nowhere exceeds 1 / (2 SOUND) and is near zero along what no neighbour spans."""

@@ -151,6 +151,20 @@ def has_choice(near: wp.vec3i, code: int):
 
 
 @wp.func
+def undoing(box: Box, code: int):
+    """The code that undoes an image: of a mirror the same, of a periodic shift the opposite."""
+    back = int(0)
+    power = int(1)
+    for axis in range(3):
+        c = image_code(code, axis)
+        if c > 0 and face_kind(box, code, axis) == PERIODIC:
+            c = 3 - c
+        back += c * power
+        power *= 3
+    return back
+
+
+@wp.func
 def opposite(code: int):
     """The code that undoes a periodic shift."""
     back = int(0)

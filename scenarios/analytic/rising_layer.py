@@ -104,8 +104,4 @@ CASE = Case(
     tolerance=0.1,
     scenarios=scenarios,
     evaluate=evaluate,
-    causes={
-        "mpm": "at a no-slip wall it takes du/dz for 0, which holds for what keeps its volume: the lowest row of what "
-        "grows stays down, an eighth of the height is lost, and the rest drifts as much too fast",
-    },
 )

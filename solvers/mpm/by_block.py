@@ -25,6 +25,7 @@ class ByBlock:
             homes.members, homes.of_particle = (wp.zeros(pool.size, dtype=int) for _ in range(2))
             homes.of_slot = wp.zeros(slots, dtype=int)
             homes.patch = wp.empty(slots * PATCH, dtype=wp.vec4)
+            self.growth = pool.growth if scene.grows else wp.zeros(1, dtype=float)
             self.given = wp.empty(pool.size if resists else 0, dtype=wp.mat33)
 
     def prepare(self) -> None:
@@ -65,6 +66,7 @@ class ByBlock:
                 pool.volume,
                 pool.phase,
                 pool.held,
+                self.growth,
                 hours.row,
                 hours.exit,
             ],
@@ -120,6 +122,7 @@ class ByBlock:
                 scene.phases,
                 pool.phase,
                 pool.held,
+                self.growth,
                 shifting,
                 pitch,
                 hours.row,

@@ -264,6 +264,34 @@ def squeezed(grid, world, node, inside, touching, kick, result, table: ti.templa
 
 
 @ti.func
+def beside_wall(gap):
+    """(u / (g dx), du/dz / g) that nodes leave out `gap` cells from a no-slip wall: see particle.py."""
+    on, behind = 0.0, 0.0
+    if gap < 0.5:
+        on, behind = 0.75 - gap * gap, 0.5 * (0.5 - gap) ** 2
+    elif gap < 1.5:
+        on = 0.5 * (1.5 - gap) ** 2
+    return ti.Vector([on / 3.0 - 2.0 * behind, 8.0 * (1.0 + gap) * behind - 4.0 * gap * on / 3.0])
+
+
+@ti.func
+def rising(grid, x, g):
+    """(velocity, diagonal of its gradient) that growth at g adds to what nodes beside no-slip walls know."""
+    v, c = vec3(0.0), vec3(0.0)
+    if g != 0.0:
+        for axis in ti.static(range(3)):
+            if grid.lower_kind[axis] == STICK:
+                low = beside_wall((x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
+                v[axis] += g * grid.dx[axis] * low[0]
+                c[axis] += g * low[1]
+            if grid.upper_kind[axis] == STICK:
+                high = beside_wall((grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
+                v[axis] -= g * grid.dx[axis] * high[0]
+                c[axis] += g * high[1]
+    return v, c
+
+
+@ti.func
 def near_walls(grid, x, c):
     """The affine field that carries momentum; du/dz near a no-slip wall times (1 + 2 (z / 1.5)^2) / 3, z in cells."""
     out = c

@@ -49,6 +49,7 @@ from .grid_taichi import (
     near_walls,
     node_at,
     reset_blocks,
+    rising,
     seen_in_wall,
     share_inside,
     slots_in_use,
@@ -127,6 +128,7 @@ def g2p(
     phases: Phases,
     phase_of: Ints,
     held: Ints,
+    growth: Floats,
     shifting: float,
     pitch: float,
     row: Ints,
@@ -149,6 +151,10 @@ def g2p(
             f = (x - grid.origin) * grid.inv_dx - base
             w = weights(f)
             gathered, moment, density, lean = gathered_from(grid, world, base, f, w, table, moving)
+            lift, steeper = rising(grid, x, growth[ti.min(p, growth.shape[0] - 1)] * (held[p] == FREE))
+            gathered += lift
+            for axis in ti.static(range(3)):
+                moment[axis, axis] += steeper[axis]
             affine[p] = moment
             phase = phase_at(phases, world, phase_of[p])
             if held[p] == FREE:
@@ -212,6 +218,7 @@ def passes(alone: bool) -> SimpleNamespace:
         volume: Floats,
         phase_of: Ints,
         held: Ints,
+        growth: Floats,
         row: Ints,
         exit: Vectors,
         table: Ints,
@@ -235,8 +242,12 @@ def passes(alone: bool) -> SimpleNamespace:
                 if heavy:
                     inertia *= ANCHOR
                 a = mat3(0.0)  # momentum per distance from the particle
+                lift, steeper = rising(grid, position[p], growth[ti.min(p, growth.shape[0] - 1)] * (held[p] == FREE))
                 if held[p] == FREE:
-                    a = inertia * near_walls(grid, position[p], c)
+                    seen = c
+                    for axis in ti.static(range(3)):
+                        seen[axis, axis] -= steeper[axis]
+                    a = inertia * near_walls(grid, position[p], seen)
                 j, b, s = volume_ratio[p], elastic_normal[p], elastic_shear[p]
                 if held[p] != CARRIED and h > 0.0:
                     t = c.trace()
@@ -254,7 +265,7 @@ def passes(alone: bool) -> SimpleNamespace:
                 base = base_node(grid, position[p])
                 f = (position[p] - grid.origin) * grid.inv_dx - base
                 w = weights(f)
-                own = inertia * velocity[p]
+                own = inertia * (velocity[p] - lift)
                 for o, q in ti.ndrange(3, 3):
                     for r in ti.static(range(3)):
                         at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)

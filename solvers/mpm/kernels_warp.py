@@ -25,7 +25,7 @@ from .grid import (
     slots_of,
     turns,
 )
-from .particle import FAULT_STENCIL, affine_of, inertia, moved, shifted, stressed, taken, weights
+from .particle import FAULT_STENCIL, affine_of, inertia, moved, rising, shifted, stressed, taken, weights
 from .piston import Piston, driven
 from .together import scatter_together, stencil
 from .walls import (
@@ -62,6 +62,7 @@ def p2g(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
+    growth: wp.array(dtype=float),
     row: wp.array(dtype=int),
     exit: wp.array(dtype=wp.vec3),
     table: wp.array(dtype=int),
@@ -83,6 +84,7 @@ def p2g(
         p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
     phase = phases[world, phase_of[p]]
     m = inertia(grid, mass[p], held[p], position[p], drags, row, exit)
+    lift, growing = rising(grid, position[p], p, held, growth)
     a = stressed(
         grid,
         dt[world],
@@ -93,6 +95,7 @@ def p2g(
         position[p],
         affine,
         m,
+        growing,
         volume,
         held,
         volume_ratio,
@@ -124,7 +127,7 @@ def p2g(
         wx,
         wy,
         wz,
-        m * velocity[p] - a * f,
+        m * (velocity[p] - lift) - a * f,
         m,
         a,
     )
@@ -258,6 +261,7 @@ def g2p(
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
+    growth: wp.array(dtype=float),
     shifting: float,
     pitch: float,
     row: wp.array(dtype=int),
@@ -282,7 +286,10 @@ def g2p(
         bx, by, bz, lx, ly, lz = node_parts(grid, base)
         s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
         sums = sums_of(moving, f, wx, wy, wz, bx, by, bz, lx, ly, lz, s0, s1, s2, s3, s4, s5, s6, s7)
-        c = affine_of(grid, sums)
+        lift, growing = rising(grid, x, p, held, growth)
+        for axis in range(3):
+            sums[0, axis] += lift[axis]
+        c = affine_of(grid, sums) + wp.diag(growing)
         affine[p] = c
         v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
         x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], pitch, volume_ratio[p], held[p])

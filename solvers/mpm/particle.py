@@ -133,6 +133,45 @@ def near_walls(grid: Grid, x: wp.vec3, c: wp.mat33):
 
 
 @wp.func
+def beside_wall(gap: float):
+    """(u / (g dx), du/dz / g) that what rises at g = du/dz lacks `gap` cells from a no-slip wall, where nodes know of
+    no growth: N0 / 3 - 2 N-1 and 8 (1 + gap) N-1 - 4 gap N0 / 3, with weights N of the nodes on and behind the wall.
+    """
+    on = float(0.0)
+    if gap < 0.5:
+        on = 0.75 - gap * gap
+    elif gap < 1.5:
+        on = 0.5 * (1.5 - gap) * (1.5 - gap)
+    behind = float(0.0)
+    if gap < 0.5:
+        behind = 0.5 * (0.5 - gap) * (0.5 - gap)
+    return on / 3.0 - 2.0 * behind, 8.0 * (1.0 + gap) * behind - 4.0 * gap * on / 3.0
+
+
+@wp.func
+def rising(grid: Grid, x: wp.vec3, p: int, held: wp.array(dtype=int), growth: wp.array(dtype=float)):
+    """(velocity [m/s], diagonal of its gradient [1/s]) that growth adds to what nodes beside no-slip walls know: these
+    take u and du/dz there for zero, which holds for what keeps its volume; what grows at g has du/dz = g.
+
+    `growth`: rates of the rest volume [1/s], or a single zero where nothing grows.
+    """
+    v = wp.vec3(0.0, 0.0, 0.0)
+    c = wp.vec3(0.0, 0.0, 0.0)
+    g = growth[wp.min(p, growth.shape[0] - 1)]
+    if g != 0.0 and held[p] == FREE:
+        for axis in range(3):
+            if grid.lower_kind[axis] == STICK:
+                lift, steeper = beside_wall((x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
+                v[axis] += g * grid.dx[axis] * lift
+                c[axis] += g * steeper
+            if grid.upper_kind[axis] == STICK:
+                lift, steeper = beside_wall((grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
+                v[axis] -= g * grid.dx[axis] * lift
+                c[axis] += g * steeper
+    return v, c
+
+
+@wp.func
 def stretch(c: wp.mat33, dt: float):
     """det(1 + dt c). Its trace alone would take the steps of what turns, along tangents, for compression: a spinning
     cube swelled by a sixth in eight turns."""
@@ -152,6 +191,7 @@ def stressed(
     x: wp.vec3,
     affine: wp.array(dtype=wp.mat33),
     m: float,
+    growing: wp.vec3,
     volume: wp.array(dtype=float),
     held: wp.array(dtype=int),
     volume_ratio: wp.array(dtype=float),
@@ -168,7 +208,7 @@ def stressed(
     s = elastic_shear[p]
     a = wp.mat33()
     if held[p] == FREE or (held[p] == CARRIED and drags == PRESSED):
-        a = columns_scaled(m * near_walls(grid, x, c), grid.dx)
+        a = columns_scaled(m * near_walls(grid, x, c - wp.diag(growing)), grid.dx)
     if (held[p] != CARRIED or drags == PRESSED) and on and dt > 0.0:
         j *= wp.max(stretch(c, dt), 0.1)
         volume_ratio[p] = j

@@ -6,6 +6,9 @@ less matter than there is. So every few ticks, where matter flows, pairs nearer 
 SPH (../crowding.py), in proportion to the strain meanwhile. What the grid does see of these shifts, their mean over its
 nodes, is taken off again: it would widen whatever is strained (a flattened drop by 6 % of its radius), for no volume
 ratio knows of it. Velocities stay: the momentum of nodes is changed by no more than how the field bends within a cell.
+
+What has grown is evened out as well, as in SPH (../corrected.py): the halves of split particles lie as they were
+born, and where none is within a cell the grid finds a gap in what should be full.
 """
 
 from typing import Any
@@ -15,14 +18,17 @@ import warp as wp
 from fluidbench.method.frame import FREE
 from fluidbench.native.crew import index_of
 from fluidbench.native.pool import Pool
-from fluidbench.native.scene import Box, Phase, Scene
+from fluidbench.native.scene import PERIODIC, Box, Phase, Scene
 
+from ..aging import GROWN, rest_density
 from ..backends import Warp
 from ..bind import warp_func
 from ..cells import Cells, WhoIsWhere, bucket_of, cell_of, place
+from ..corrected import enclosed, least_eigenvalue
 from ..crowding import CLOSE, excess, nearest, out_of_crowd
 from ..flow import advanced, shear_rate, threshold_of
-from ..images import has_choice, image_position, near_faces, opposite
+from ..images import face_kind, has_choice, image_position, near_faces, undoing
+from ..pairs import floats
 from ..search import around
 from ..smoothing import wendland_slope
 from .grid import Grid, clear_grid
@@ -36,6 +42,7 @@ KERNEL = 1.5  # smoothing length of the crowding, in spacings: SPH's in matter t
 LONGEST = wp.constant(0.25)  # shift at a time, in spacings: as far as matter goes in a tick
 
 slope = warp_func(wendland_slope)
+Sums = floats(12)  # crowding (3), the gradient of the concentration (3) and the second moment: xx yy zz xy xz yz
 
 
 @wp.struct
@@ -45,27 +52,51 @@ class Apart:
     h: float  # smoothing length [m]
     near: float  # kernel at the distance below which partners crowd each other [1/m^3]
     strain: float  # shift over the rate of shear and h^2 crowding [s]
+    evens: int  # 1 where matter grows, and is evened out
 
 
 @wp.func
-def crowd_through(
-    num: Apart, box: Box, cells: Cells, world: int, i: int, x: wp.vec3, code: int, volume: wp.array(dtype=float)
+def through(
+    num: Apart,
+    box: Box,
+    cells: Cells,
+    world: int,
+    i: int,
+    x: wp.vec3,
+    code: int,
+    volume: wp.array(dtype=float),
+    sums: Sums,
 ):
-    """What the images of all others by the shift of this code, or they themselves (0), add to the crowding of particle
-    i at x."""
-    at = image_position(box, x, opposite(code))  # where it sees others as it sees their images from x
+    """The sums of particle i at x, gone on with over the images of all others of this code, or them themselves (0);
+    mirrored ones crowd nobody."""
+    signs = wp.vec3(1.0, 1.0, 1.0)
+    for axis in range(3):
+        if face_kind(box, code, axis) != PERIODIC:
+            signs[axis] = -1.0
+    mirrored = signs[0] + signs[1] + signs[2] < 3.0
+    at = image_position(box, x, undoing(box, code))  # where it sees others as it sees their images from x
     middle = cell_of(at, cells.width)
-    crowd = wp.vec3(0.0, 0.0, 0.0)
     for c in range(27):
         bucket = bucket_of(cells, world, around(middle, c))
         start = cells.start[bucket]
         for m in range(start, start + cells.number[bucket]):
-            r = at - place(cells.spot[m])
+            r = wp.cw_mul(signs, at - place(cells.spot[m]))
             length = wp.length(r)
             if length < cells.width and (code > 0 or cells.members[m] != i):
-                share = excess(length, num.h, num.near) * volume[cells.members[m]]
-                crowd += (slope(length / num.h, num.h) * share) * r
-    return crowd
+                w = slope(length / num.h, num.h) * volume[cells.members[m]]
+                crowds = float(0.0)
+                if not mirrored:
+                    crowds = excess(length, num.h, num.near)
+                for a in range(3):
+                    sums[a] += crowds * w * r[a]
+                if num.evens == 1:
+                    for a in range(3):
+                        sums[3 + a] += w * r[a]
+                        sums[6 + a] -= w * r[a] * r[a]
+                    sums[9] -= w * r[0] * r[1]
+                    sums[10] -= w * r[0] * r[2]
+                    sums[11] -= w * r[1] * r[2]
+    return sums
 
 
 @wp.kernel
@@ -80,6 +111,7 @@ def separate(
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     affine: wp.array(dtype=wp.mat33),
     elastic_normal: wp.array(dtype=wp.vec3),
@@ -106,13 +138,23 @@ def separate(
         if held[i] == FREE and flows:
             x = position[i]
             near = near_faces(box, x, cells.width, True)
+            if num.evens == 1:
+                walls = near_faces(box, x, cells.width, False)
+                for axis in range(3):
+                    near[axis] = near[axis] | walls[axis]
             codes = int(1)
             if near[0] + near[1] + near[2] > 12:
                 codes = 27
-            crowd = wp.vec3(0.0, 0.0, 0.0)
+            sums = Sums()
             for code in range(codes):
                 if has_choice(near, code):
-                    crowd += crowd_through(num, box, cells, world, i, x, code, volume)
+                    sums = through(num, box, cells, world, i, x, code, volume, sums)
+            crowd = wp.vec3(sums[0], sums[1], sums[2])
+            if num.evens == 1 and rest_density(mass, volume, i) < GROWN * phase.density:
+                moment = wp.mat33(
+                    sums[6], sums[9], sums[10], sums[9], sums[7], sums[11], sums[10], sums[11], sums[8]
+                )  # fmt: skip
+                crowd += enclosed(least_eigenvalue(moment)) * wp.vec3(sums[3], sums[4], sums[5])
             by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]))
             found = wp.vec4(by[0], by[1], by[2], 1.0)
         shift[i] = found
@@ -177,10 +219,11 @@ class Separation:
         num.h = KERNEL * scene.spacing
         num.near = nearest(scene.spacing, num.h)
         num.strain = constant * EVERY * scene.clock.tick
+        num.evens = int(scene.expands)
         with wp.ScopedDevice(scene.device):
             self.shift = wp.zeros(pool.size, dtype=wp.vec4)
             self._nobody = wp.zeros(1, dtype=int)
-        self.who = WhoIsWhere(scene, pool, CLOSE * scene.spacing)
+        self.who = WhoIsWhere(scene, pool, 2.0 * num.h if scene.expands else CLOSE * scene.spacing)
         self.backend = Warp(scene.crew)
 
     def prepare(self) -> None:
@@ -194,7 +237,7 @@ class Separation:
         """Enqueue: move apart who is too near, by way of `nodes`; `lanes` are the threads that empty them."""
         pool, scene, launch = self.pool, self.scene, self.backend.launch
         some = [pool.capacity, pool.count]
-        matter = [pool.phase, pool.held, pool.position, pool.volume, pool.affine, *self.elastic, scene.dt]
+        matter = [pool.phase, pool.held, pool.position, pool.mass, pool.volume, pool.affine, *self.elastic, scene.dt]
         self.who.tell(self.backend)
         launch(separate, pool.size, [self.num, scene.box, self.who.cells, *some, scene.phases, *matter], [self.shift])
         launch(clear_grid, lanes, [active, lanes], [nodes])

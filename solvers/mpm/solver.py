@@ -124,6 +124,7 @@ class SolverMPM(Solver):
         pool.add_field("elastic_shear", wp.vec3)
         self.strains = [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, plastic_strains(scene, pool)]
         with wp.ScopedDevice(scene.device):
+            self.growth = pool.growth if scene.grows else wp.zeros(1, dtype=float)
             self.table = wp.zeros(blocks, dtype=int)
             self.block_of = wp.zeros(slots, dtype=int)
             self.active = wp.zeros(1, dtype=int)
@@ -140,7 +141,7 @@ class SolverMPM(Solver):
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
         self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots)
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
-        apart = config.separation > 0.0 and not scene.expands and self.held is None
+        apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
         self.arranges = EVERY if apart else 0
         self.piston = piston_of(scene, not implicit and self.held is None)
@@ -252,6 +253,7 @@ class SolverMPM(Solver):
                 pool.volume,
                 pool.phase,
                 pool.held,
+                self.growth,
                 hours.row,
                 hours.exit,
                 self.table,
@@ -310,6 +312,7 @@ class SolverMPM(Solver):
                 scene.phases,
                 pool.phase,
                 pool.held,
+                self.growth,
                 self.shifting,
                 0.0 if self.held else scene.spacing,
                 hours.row,

@@ -8,7 +8,7 @@ from fluidbench.method.frame import CARRIED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.scene import PERIODIC
 
-from ..aging import DISORDER
+from ..aging import DISORDER, GROWN
 from ..corrected import EDGE, INSIDE, LEANING, SOUND
 from ..corrected_taichi import (
     elastic_stress,
@@ -56,7 +56,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_warp import STATE
-from .particle import GROWN, WHOLE, Smoothing
+from .particle import WHOLE, Smoothing
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
 kernel = taichi_func(wendland)

@@ -10,7 +10,7 @@ from fluidbench.native.scene import Phase
 
 from ..aging import DISORDER
 from ..bind import warp_func
-from ..corrected import EDGE, INSIDE, LEANING, SOUND
+from ..corrected import EDGE, SOUND
 from ..smoothing import wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -18,7 +18,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 slope = warp_func(wendland_slope)
 
 WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
-GROWN = wp.constant(0.99)  # of the fresh density, below which matter has grown and split
 
 
 @wp.struct
@@ -55,18 +54,6 @@ def straggling(least: float):
     more, and were thrown off at 3 m/s. Along the line of centres this slows nothing that rests, flies or turns.
     """
     return wp.clamp((EDGE - least) / (EDGE - SOUND), 0.0, 1.0)
-
-
-@wp.func
-def enclosed(least: float):
-    """How far a particle is from any free surface [-], by the least eigenvalue of its moment: 1 where it has neighbours
-    all round, 0 from halfway to a face on. (Marrone et al. 2010, J. Comput. Phys. 229:3652, tell surfaces by it.)
-
-    What has grown is evened out there. The halves of split particles lie as they were born, and no stress says where
-    they should: a kernel three spacings wide does not see how far above a floor a row is. Nothing held the lowest row
-    of rising foam down; a gap of half a spacing opened under it, and the foam slid off.
-    """
-    return wp.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
 
 
 @wp.func

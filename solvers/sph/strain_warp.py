@@ -8,9 +8,11 @@ from fluidbench.native.pool import FAULT_STATE
 from fluidbench.native.scene import Box, Phase, is_solid
 from fluidbench.native.vector_access import store_vec4
 
+from ..aging import GROWN
 from ..corrected import (
     SOUND,
     elastic_stress,
+    enclosed,
     from_before,
     least_eigenvalue,
     spanned,
@@ -24,7 +26,7 @@ from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import STATE
-from .particle import GROWN, Smoothing, broken, drifted, enclosed, pulled_back, slope, straggling
+from .particle import Smoothing, broken, drifted, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
