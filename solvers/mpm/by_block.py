@@ -14,9 +14,12 @@ from .patches import add_up, gather, resist, scatter
 class ByBlock:
     """What the block-wise transfers allocate, and their launches; for one thread of the CPU or several."""
 
-    def __init__(self, scene: Scene, pool: Pool, strains: list[wp.array], slots: int, resists: bool) -> None:
-        """`strains` are the fields of the pool that a step strains; `resists` is whether viscosity is implicit."""
-        self.strains = strains
+    def __init__(
+        self, scene: Scene, pool: Pool, strains: list[wp.array], growth: wp.array, slots: int, resists: bool
+    ) -> None:
+        """`strains` are the fields of the pool that a step strains; `growth` as in particle.rising; `resists`: whether
+        viscosity is implicit."""
+        self.strains, self.growth = strains, growth
         self.scene, self.pool, self.launch, self.lanes = scene, pool, scene.crew.launch, scene.crew.threads
         homes = self.homes = Homes()
         with wp.ScopedDevice(scene.device):
@@ -25,7 +28,6 @@ class ByBlock:
             homes.members, homes.of_particle = (wp.zeros(pool.size, dtype=int) for _ in range(2))
             homes.of_slot = wp.zeros(slots, dtype=int)
             homes.patch = wp.empty(slots * PATCH, dtype=wp.vec4)
-            self.growth = pool.growth if scene.grows else wp.zeros(1, dtype=float)
             self.given = wp.empty(pool.size if resists else 0, dtype=wp.mat33)
 
     def prepare(self) -> None:

@@ -135,7 +135,9 @@ class SolverMPM(Solver):
             scene, pool, np.array(self.grid.dx), shift=0.5
         )  # particles of one cell share their 27 nodes
         self.by_block = (
-            ByBlock(scene, pool, self.strains, slots, implicit) if scene.device.is_cpu and backend == "warp" else None
+            ByBlock(scene, pool, self.strains, self.growth, slots, implicit)
+            if scene.device.is_cpu and backend == "warp"
+            else None
         )
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
