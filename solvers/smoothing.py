@@ -40,6 +40,14 @@ def cusp_slope(r: float, support: float):
     return -15.0 / (pi * support * support * support * support) * t
 
 
+def poly6(r: float, support: float):
+    """Kernel with a flat top [1/m^3], support H: what two are apart when they are near does not show. Mueller et al.
+    2003."""
+    q = r / support
+    t = max(1.0 - q * q, 0.0)
+    return 315.0 / (64.0 * pi * support * support * support) * t * t * t
+
+
 def spiky(r: float, support: float):
     """Spiky kernel [1/m^3], support H: its peak keeps particles from clumping. Desbrun & Gascuel 1996."""
     d = max(support - r, 0.0)

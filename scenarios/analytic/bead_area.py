@@ -34,5 +34,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=1.5e-3,
-    exempt={"pbd": "one-sided constraints set the packing: the area comes out 2 % large"},
 )

@@ -76,5 +76,4 @@ CASE = Case(
     tolerance=0.02,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "disorder of halves reads as density, which pushes: thirtyfold 0.06 at R / 4"},
 )

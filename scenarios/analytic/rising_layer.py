@@ -105,8 +105,6 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     causes={
-        "pbd": "within 7 % of the drift, but for 0.1 s after all of it has split at once: settling the halves throws "
-        "it back, at twice its drift",
         "mpm": "right at 1 s (0.005); then the floor's grip lets go of rows that are 0.7 cells away from it, and the "
         "layer slides off: at a grid ratio of 1.5 from 0.8 s on, and the run is stopped",
     },

@@ -3,7 +3,7 @@ anew from the same equations."""
 
 from fluidbench.method.frame import CARRIED, FREE
 
-from ..corrected import SOUND
+from ..corrected import ROUND, SOUND
 from ..corrected_taichi import (
     elastic_stress,
     from_before,
@@ -17,7 +17,7 @@ from ..flow_taichi import pressure, strained
 from ..hourglass_taichi import off_linear_after
 from ..neighbours_taichi import BoxT, ListsT, image_traction, image_velocity
 from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, symmetric_at, vector_at, vector_into, writer
-from ..smoothing import drag_weight, spiky_slope
+from ..smoothing import cusp, drag_weight, poly6, spiky_slope
 from ..taichi_bridge import (
     Floats,
     Ints,
@@ -38,17 +38,20 @@ from .numbers import MOVING, PULLING, Numbers
 
 NumbersT = struct_of(Numbers)
 gradient, weight = taichi_func(spiky_slope), taichi_func(drag_weight)
+summed, flat = taichi_func(cusp), taichi_func(poly6)
 moving_of, pulling_of = reader(MOVING), reader(PULLING)
 write_pulling = writer(PULLING)
 
 
 @ti.kernel
-def pack(capacity: int, count: Ints, position: Vectors, volume: Floats, velocity: Vectors, moving: Quads):
+def pack(
+    capacity: int, count: Ints, position: Vectors, volume: Floats, velocity: Vectors, overread: Floats, moving: Quads
+):
     for i in range(position.shape[0]):
         if i % capacity < count[i // capacity]:
             x, v = position[i], velocity[i]
             moving[2 * i] = vec4(x[0], x[1], x[2], volume[i])
-            moving[2 * i + 1] = vec4(v[0], v[1], v[2], 0.0)
+            moving[2 * i + 1] = vec4(v[0], v[1], v[2], overread[i])
 
 
 @ti.func
@@ -61,6 +64,12 @@ def sloping(num, other, r):
 def holding(num, other, r):
     """V_j w of hourglass control."""
     return other[3] * weight(r.norm() / num.support, num.support)
+
+
+@ti.func
+def own_density(num, volume):
+    """What a particle adds to its own density: its volume counts by half."""
+    return 0.5 * (volume + num.spacing**3) * summed(0.0, num.support)
 
 
 @ti.func
@@ -79,14 +88,16 @@ def strain_pair(num, own, begun, other, r):
     g = sloping(num, other, r)
     square = -g.outer_product(r)
     u = vector_at(own, 4) - vector_at(other, 4)
-    sums = matrix_into(ti.Vector.zero(ti.f32, 21), 0, -u.outer_product(g))
+    sums = matrix_into(ti.Vector.zero(ti.f32, 24), 0, -u.outer_product(g))
     sums = vector_into(sums, 9, vec3(square[0, 0], square[1, 1], square[2, 2]))
     sums = vector_into(sums, 12, vec3(square[0, 1], square[0, 2], square[1, 2]))
     sums = vector_into(sums, 15, holding(num, other, r) * r)
+    level = flat(r.norm(), num.support)
+    sums = vector_into(sums, 21, other[3] * vec3(summed(r.norm(), num.support), level, level * other[7]))
     return vector_into(sums, 18, holding(num, other, r) * u)
 
 
-strained_by = over_pairs(MOVING, 21, strain_pair, moving_seen)
+strained_by = over_pairs(MOVING, 24, strain_pair, moving_seen)
 
 
 @ti.kernel
@@ -112,6 +123,9 @@ def strain(
     off_linear: Vectors,
     plastic: Floats,
     kept: Floats,
+    enclosure: Floats,
+    overread: Floats,
+    bias: Floats,
     pulling: Quads,
     pulled: Vectors,
 ):
@@ -143,6 +157,13 @@ def strain(
                         volume_ratio[i] = ratio
                 if is_solid(phase):
                     push = ratio * pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+                own_level = own[3] * flat(0.0, num.support)
+                level = sums[22] + own_level
+                apart = (num.lattice * least_eigenvalue(moment) / ROUND - num.face_moment) / (1.0 - num.face_moment)
+                enclosure[i] = ti.math.clamp(2.0 * apart, 0.0, 1.0)
+                bias[i] = (sums[23] + own_level * own[7]) / level
+                dense = num.weight * (sums[21] + own_density(num, own[3]))
+                overread[i] = enclosure[i] * (dense / (num.flat_weight * level) - 1.0)
                 packing = ti.max(num.lattice * moment.trace() / 3.0, 1.0)
                 back = share * phase.shear_modulus * num.hourglass / packing**2 * z
                 carried = elastic_stress(share * phase.shear_modulus, b, s, push) - back.outer_product(leaning)
@@ -185,6 +206,9 @@ def pull(
     off_linear: Vectors,
     plastic: Floats,
     kept: Floats,
+    enclosure: Floats,
+    overread: Floats,
+    bias: Floats,
     pulling: Quads,
     pulled: Vectors,
 ):

@@ -21,6 +21,7 @@ from fluidbench.native.vector_access import store_vec4
 from ..aging import rest_density
 from ..bind import warp_func
 from ..corrected import (
+    ROUND,
     SOUND,
     elastic_stress,
     from_before,
@@ -34,14 +35,15 @@ from ..flow import pressure, strained
 from ..hourglass import off_linear
 from ..images import image_traction, image_velocity
 from ..pairs import Pass, floats
-from ..smoothing import drag_weight, spiky_slope
+from ..smoothing import cusp, drag_weight, poly6, spiky_slope
 from ..tool import Tool, felt, seen_by_tool
 from .numbers import MOVING, PULLING, Numbers
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 gradient, weight = warp_func(spiky_slope), warp_func(drag_weight)
-vec21 = floats(21)
+summed, flat = warp_func(cusp), warp_func(poly6)
+vec24 = floats(24)
 
 
 @wp.struct
@@ -60,6 +62,9 @@ class Straining:
     off_linear: wp.array(dtype=wp.vec3)
     plastic: wp.array(dtype=float)  # strain; one zero where nothing hardens
     kept: wp.array(dtype=float)
+    enclosure: wp.array(dtype=float)  # 0 at a free surface, 1 from halfway to within on
+    overread: wp.array(dtype=float)  # share by which disorder makes the density read too high, times enclosure
+    bias: wp.array(dtype=float)  # mean of that over the neighbours
     pulling: wp.array(dtype=wp.vec4)
     pulled: wp.array(dtype=wp.vec3)
     tool: Tool
@@ -73,6 +78,7 @@ def pack(
     position: wp.array(dtype=wp.vec3),
     volume: wp.array(dtype=float),
     velocity: wp.array(dtype=wp.vec3),
+    overread: wp.array(dtype=float),
     # outputs
     moving: wp.array(dtype=wp.vec4),
 ):
@@ -81,7 +87,7 @@ def pack(
     if i % capacity < count[i / capacity]:
         x, v = position[i], velocity[i]
         store_vec4(moving, 2 * i, wp.vec4(x[0], x[1], x[2], volume[i]))
-        store_vec4(moving, 2 * i + 1, wp.vec4(v[0], v[1], v[2], 0.0))
+        store_vec4(moving, 2 * i + 1, wp.vec4(v[0], v[1], v[2], overread[i]))
 
 
 @wp.func
@@ -98,6 +104,13 @@ def holding(num: Numbers, volume: float, r: wp.vec3):
 
 
 @wp.func
+def counted(num: Numbers, volume: float):
+    """Volume with which a particle counts in its own density [m^3]: its own by half, so that a lattice stretched by a
+    percent sums as before."""
+    return 0.5 * (volume + num.spacing * num.spacing * num.spacing)
+
+
+@wp.func
 def seen_moving(box: Box, data: Straining, row: floats(MOVING), j: int, code: int):
     v = image_velocity(box, wp.vec3(row[4], row[5], row[6]), code)
     for axis in range(3):
@@ -109,18 +122,21 @@ def seen_moving(box: Box, data: Straining, row: floats(MOVING), j: int, code: in
 def strain_pair(num: Numbers, own: floats(MOVING + 4), other: floats(MOVING), r: wp.vec3):
     g = sloping(num, other[3], r)
     w = holding(num, other[3], r)
+    distance = wp.length(r)
+    level = other[3] * flat(distance, num.support)
     u = wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
-    return vec21(
+    return vec24(
         -u[0] * g[0], -u[0] * g[1], -u[0] * g[2],
         -u[1] * g[0], -u[1] * g[1], -u[1] * g[2],
         -u[2] * g[0], -u[2] * g[1], -u[2] * g[2],
         -g[0] * r[0], -g[1] * r[1], -g[2] * r[2], -g[0] * r[1], -g[0] * r[2], -g[1] * r[2],
         w * r[0], w * r[1], w * r[2], w * u[0], w * u[1], w * u[2],
+        other[3] * summed(distance, num.support), level, level * other[7],
     )  # fmt: skip
 
 
 @wp.func
-def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(MOVING + 4), sums: vec21):
+def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(MOVING + 4), sums: vec24):
     phase = data.phases[world, data.phase_of[i]]
     h = data.dt[world]
     stress, back = wp.mat33(), wp.vec3()
@@ -139,7 +155,8 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
         b = data.elastic_normal[i]
         s = data.elastic_shear[i]
         # the gradient of a straggler is not exact even in a linear flow
-        whole = float(least_eigenvalue(moment) >= SOUND)
+        least = least_eigenvalue(moment)
+        whole = float(least >= SOUND)
         leaning = wp.vec3(sums[15], sums[16], sums[17])
         q = whole * (wp.vec3(sums[18], sums[19], sums[20]) - seen * leaning)
         z = whole * data.off_linear[i]
@@ -157,6 +174,13 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
                 data.volume_ratio[i] = ratio
         if is_solid(phase):
             push = ratio * pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+        apart = (num.lattice * least / ROUND - num.face_moment) / (1.0 - num.face_moment)
+        own_level = own[3] * flat(0.0, num.support)
+        level = sums[22] + own_level
+        dense = num.weight * (sums[21] + counted(num, own[3]) * summed(0.0, num.support))
+        data.bias[i] = (sums[23] + own_level * own[7]) / level
+        data.enclosure[i] = wp.clamp(2.0 * apart, 0.0, 1.0)
+        data.overread[i] = data.enclosure[i] * (dense / (num.flat_weight * level) - 1.0)
         modulus = data.kept[i] * phase.shear_modulus
         # where matter is packed more densely q is larger for the same motion, and so is what the traction does
         packing = wp.max(num.lattice * wp.trace(moment) / 3.0, 1.0)
@@ -170,7 +194,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
 
 @wp.func
 def tooled_strain_finish(
-    num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(MOVING + 4), sums: vec21
+    num: Numbers, box: Box, data: Straining, world: int, i: int, own: floats(MOVING + 4), sums: vec24
 ):
     found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
     if found.on == 1:
@@ -185,10 +209,16 @@ def tooled_strain_finish(
     strain_finish(num, box, data, world, i, own, sums)
 
 
-strain = Pass(Numbers, Straining, MOVING, 21, strain_pair, strain_finish, seen=seen_moving)
+strain = Pass(Numbers, Straining, MOVING, 24, strain_pair, strain_finish, seen=seen_moving)
 """Elastic strain after the substep by the common law, and its stress times the correction of gradients. The volume of
 what flows is the density constraint's; only a solid's is elastic. Sums: velocity gradient (9), moment (6); weighed for
-hourglass control the places of partners (3), and the motion off their mean (3)."""
+hourglass control the places of partners (3), and the motion off their mean (3); the density by two kernels, and by how
+much partners over-read it.
+
+Any sum reads particles in disorder too dense, the more the sharper its kernel's peak; one that is flat where others
+keep their distance does not, but would not see pairs. So what a particle reads beyond its neighbourhood is judged by
+the sharp one, and the mean of a neighbourhood is brought to that of the flat one: `bias` divides the density
+(kernels_warp.py)."""
 
 
 @wp.func

@@ -23,6 +23,8 @@ class Elasticity:
         data.elastic_shear = pool.add_field("elastic_shear", wp.vec3)
         data.off_linear = pool.add_field("off_linear", wp.vec3)
         data.plastic = plastic_strains(scene, pool)
+        data.enclosure = pool.add_field("enclosure", float)
+        data.overread, data.bias = pool.add_field("overread", float), pool.add_field("bias", float)
         data.kept, data.pulled = self.kept, pool.add_field("pulled", wp.vec3)
         with wp.ScopedDevice(scene.device):
             self.moving = wp.zeros(pool.size * MOVING // 4, dtype=wp.vec4)

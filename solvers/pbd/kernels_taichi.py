@@ -10,7 +10,6 @@ from fluidbench.native.scene import FRICTION, PERIODIC
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, walled
 from ..pairs_taichi import over_pairs, reader, vector_at, vector_into
-from ..smoothing import cusp
 from ..taichi_bridge import (
     Floats,
     Forces,
@@ -22,16 +21,14 @@ from ..taichi_bridge import (
     force_at,
     is_solid,
     phase_at,
-    taichi_func,
     ti,
     too_fast,
     vec4,
 )
-from .elastic_taichi import KERNELS, NumbersT, gradient, sloping
+from .elastic_taichi import KERNELS, NumbersT, gradient, own_density, sloping, summed
 from .kernels_warp import CROWDED, DRAWN, FARTHEST, HURRIED, NEAREST, PARTED, SLACK, SLACK_SOLID
 from .numbers import PLACE, PUSH
 
-summed = taichi_func(cusp)
 place_of, push_of = reader(PLACE), reader(PUSH)
 
 
@@ -106,6 +103,8 @@ def multipliers(
     motion: Vectors,
     pushes: Quads,
     fill: Floats,
+    bias: Floats,
+    enclosure: Floats,
     correction: Vectors,
 ):
     for i in range(held.shape[0]):
@@ -113,19 +112,21 @@ def multipliers(
         if i - world * capacity < count[world]:
             own = place_of(places, i)
             sums = constrained_by(num, box, lists, entries, number, places, held, i, own, vec4(0.0))
-            dense = num.weight * (sums[0] + 0.5 * (own[3] + num.spacing**3) * summed(0.0, num.support))
-            fill[i] = dense
+            dense = num.weight * (sums[0] + own_density(num, own[3]))
             phase = phase_at(phases, world, phase_of[i])
+            flows = phase.shear_modulus > 0.0 and not is_solid(phase)
+            if flows:
+                dense /= 1.0 + bias[i]
+            fill[i] = dense
             slope = vector_at(sums, 1).norm() * num.spacing
             metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
             excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK)
             multiplier = -ti.math.clamp(excess, 0.0, CROWDED) / metric
-            if phase.shear_modulus > 0.0 and not is_solid(phase):
-                even = ti.math.clamp(2.0 - 4.0 * slope / num.face_slope, 0.0, 1.0)
+            if flows:
                 within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
                 wave = dt[world] / num.spacing
                 compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
-                multiplier += DRAWN * even * within * ti.max(1.0 - SLACK - dense, 0.0) / (metric + compliance)
+                multiplier += DRAWN * enclosure[i] * within * ti.max(1.0 - SLACK - dense, 0.0) / (metric + compliance)
             pushes[3 * i] = places[i]
             pushes[3 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), 0.0, 0.0)
             pushes[3 * i + 2] = vec4(motion[i][0], motion[i][1], motion[i][2], 0.0)
@@ -168,6 +169,8 @@ def correct(
     motion: Vectors,
     pushed: Quads,
     fill: Floats,
+    bias: Floats,
+    enclosure: Floats,
     correction: Vectors,
 ):
     for i in range(held.shape[0]):

@@ -17,18 +17,15 @@ from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Box, Force, Phase, force_at, is_solid, too_fast
 from fluidbench.native.vector_access import store_vec4
 
-from ..bind import warp_func
 from ..images import WALL_INSET, contained, image_gradient, walled
 from ..pairs import Pass, floats
-from ..smoothing import cusp
 from ..tool import Tool, felt, outside
-from .elastic_warp import KERNELS, elastic, gradient, sloping
+from .elastic_warp import KERNELS, counted, elastic, gradient, sloping, summed
 from .numbers import PLACE, PUSH, Numbers
 from .walls import pushed, wall_friction
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-summed = warp_func(cusp)
 vec5 = floats(5)
 
 SLACK = wp.constant(
@@ -92,6 +89,8 @@ class Constraining:
     motion: wp.array(dtype=wp.vec3)
     pushes: wp.array(dtype=wp.vec4)
     fill: wp.array(dtype=float)
+    bias: wp.array(dtype=float)  # of the density, by disorder: elastic_warp.py; one zero where nothing is elastic
+    enclosure: wp.array(dtype=float)
     correction: wp.array(dtype=wp.vec3)
     tool: Tool
 
@@ -107,22 +106,23 @@ def multiplier_pair(num: Numbers, own: floats(PLACE + 4), other: floats(PLACE), 
 def multiplier_finish(
     num: Numbers, box: Box, data: Constraining, world: int, i: int, own: floats(PLACE + 4), sums: vec5
 ):
-    # Its own term counts the particle's volume by half: a lattice stretched by a percent then sums as before.
-    dense = sums[0] + 0.5 * (own[3] + num.spacing * num.spacing * num.spacing) * summed(0.0, num.support)
-    dense *= num.weight
-    data.fill[i] = dense
+    dense = num.weight * (sums[0] + counted(num, own[3]) * summed(0.0, num.support))
     together = wp.vec3(sums[1], sums[2], sums[3])
     phase = data.phases[world, data.phase_of[i]]
+    flows = phase.shear_modulus > 0.0 and not is_solid(phase)
+    if flows:
+        dense /= 1.0 + data.bias[i]
+    data.fill[i] = dense
     limit = 1.0 + wp.where(is_solid(phase), SLACK_SOLID, SLACK)
     # Lengths are scaled by the spacing to make epsilon a number.
     slopes = (sums[4] + wp.dot(together, together)) * num.spacing * num.spacing
     metric = num.response * slopes + num.relaxation
     multiplier = -wp.clamp(dense - limit, 0.0, CROWDED) / metric
-    if phase.shear_modulus > 0.0 and not is_solid(phase):
-        # A surface must not be drawn together: what lies within matter is denser than its face, and lies more evenly.
-        even = wp.clamp(2.0 - 4.0 * wp.length(together) * num.spacing / num.face_slope, 0.0, 1.0)
+    if flows:
+        # A surface must not be drawn together: what lies within matter is denser than its face, and has others all
+        # round.
         within = wp.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
-        lack = even * within * wp.max(1.0 - SLACK - dense, 0.0)
+        lack = data.enclosure[i] * within * wp.max(1.0 - SLACK - dense, 0.0)
         # Tension of bulk modulus K: it moves by dt^2 K lack grad W / rho in a substep, however short.
         wave = data.dt[world] / num.spacing
         compliance = num.iterations * data.mass[i] / (own[3] * phase.bulk_modulus * wave * wave)

@@ -16,12 +16,13 @@ class Numbers:
     support: float  # kernel radius H [m]
     spacing: float  # [m]
     weight: float  # makes the density sum exactly 1 on a lattice at rest [-]
+    flat_weight: float  # the same of the kernel with a flat top [-]
     slope_weight: float  # the same of the kernel whose slope particles are moved along [-]
     response: float  # of the density to a move along that slope, over that of its own kernel's [-]
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
     face: float  # density at the face of a lattice, over that at rest [-]
-    face_slope: float  # sum of the gradients there, over 1 / spacing [-]
+    face_moment: float  # least eigenvalue there of the second moment, as bounded, over that within [-]
     iterations: float  # of the density constraints in a substep
     hourglass: float  # zeta l^2 of the hourglass control [m^2]
     lattice: float  # makes the second moment of the spiky kernel's slope 1 on a lattice [-]
@@ -65,11 +66,20 @@ def stiffest(support_ratio: float) -> float:
     return 1.0 / opposed(lattice(support_ratio), np.array(weights))
 
 
-def face_sums(support_ratio: float) -> tuple[float, float]:
-    """(w, |grad s|) summed at the face of a cubic half lattice of unit spacing, over the sums of w and s within it: the
-    kernels of `response`."""
-    z, r = lattice(support_ratio)[:, 2], distances(support_ratio)
-    half = z <= 0
-    slopes = [spiky_slope(float(s), support_ratio) * u / s for s, u in zip(r[z < 0], z[z < 0], strict=True)]
-    level = sum(cusp(float(s), support_ratio) for s in r[half]) / lattice_sum(cusp, support_ratio)
-    return level, abs(sum(slopes)) / lattice_sum(spiky, support_ratio)
+def face_level(support_ratio: float) -> float:
+    """Density summed at the face of a cubic half lattice, over that within it."""
+    half = distances(support_ratio)[lattice(support_ratio)[:, 2] <= 0]
+    return sum(cusp(float(r), support_ratio) for r in half) / lattice_sum(cusp, support_ratio)
+
+
+def face_moment(support_ratio: float) -> float:
+    """4 det M / trace(M)^2 at the face of a cubic half lattice, over that within it (../corrected.py,
+    `least_eigenvalue`); M sums -w' r r^T / |r| of the spiky kernel."""
+    places, r = lattice(support_ratio), distances(support_ratio)
+    weights = np.array([-spiky_slope(float(s), support_ratio) / s if s > 0.0 else 0.0 for s in r])
+
+    def bound(chosen: np.ndarray) -> float:
+        moment = (weights[chosen, None] * places[chosen]).T @ places[chosen]
+        return 4.0 * float(np.linalg.det(moment)) / float(np.trace(moment)) ** 2
+
+    return bound(places[:, 2] <= 0) / bound(r >= 0.0)

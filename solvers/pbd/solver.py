@@ -21,7 +21,7 @@ from ..conjugate import carried_by, effort_of, footprint_of
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import cusp, spiky, spiky_slope
+from ..smoothing import cusp, poly6, spiky, spiky_slope
 from ..tool import table_of, tool_of
 from ..tool_map import Weights
 from ..viscosity import ImplicitViscosity, beside
@@ -35,7 +35,8 @@ from .numbers import (
     PULLING,
     PUSH,
     Numbers,
-    face_sums,
+    face_level,
+    face_moment,
     lattice_sum,
     response,
     second_moment,
@@ -125,10 +126,11 @@ class SolverPBD(Solver):
         self.num.support = config.support_ratio * scene.spacing
         self.num.spacing = scene.spacing
         self.num.weight = 1.0 / lattice_sum(cusp, config.support_ratio)
+        self.num.flat_weight = 1.0 / lattice_sum(poly6, config.support_ratio)
         self.num.slope_weight = 1.0 / lattice_sum(spiky, config.support_ratio)
         self.num.response = response(config.support_ratio)
         self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
-        self.num.face, self.num.face_slope = face_sums(config.support_ratio)
+        self.num.face, self.num.face_moment = face_level(config.support_ratio), face_moment(config.support_ratio)
         self.num.iterations = float(config.iterations)
         length = stiffest(config.support_ratio) * scene.spacing
         self.num.hourglass = config.zeta(scene.scenario.material) * length * length
@@ -151,6 +153,11 @@ class SolverPBD(Solver):
         self.constraining.motion = self.motion
         self.constraining.pushes, self.constraining.fill = self.pushes, self.fill
         self.elastic = Elasticity(scene, pool) if scene.elastic else None
+        if self.elastic is None:
+            self.constraining.bias = self.constraining.enclosure = wp.zeros(1, dtype=float, device=scene.device)
+        else:
+            self.constraining.bias = self.elastic.straining.bias
+            self.constraining.enclosure = self.elastic.straining.enclosure
         self.tool = None if scene.outline is None else tool_of(scene, self.num.support, weights(self.num.support))
         if self.tool is not None:
             self.constraining.tool = self.tool
@@ -300,7 +307,7 @@ class SolverPBD(Solver):
     def pack(self) -> None:
         assert self.elastic is not None
         pool = self.pool
-        inputs = [*self._active(), pool.position, pool.volume, pool.velocity]
+        inputs = [*self._active(), pool.position, pool.volume, pool.velocity, self.elastic.straining.overread]
         self._launch(self.kernels.pack, inputs, [self.elastic.moving])
 
     def strain(self) -> None:

@@ -82,7 +82,8 @@ class Twins:
 
     def _least_scales(self) -> dict[str, float]:
         """Of what is made of numbers that cancel: SPH's shifts of crowding of order 1 / h, PBD's multipliers of
-        densities of order 1, its stress of elastic tensors of order 1, MPM's momenta of pushes on one of 27 nodes."""
+        densities of order 1 and what disorder adds to them, its stress of elastic tensors of order 1, MPM's momenta of
+        pushes on one of 27 nodes."""
         sim = self.warp
         if self.method == "sph":
             speed, dt = float(np.abs(sim.pool.velocity.numpy()).max()), float(sim.scene.dt.numpy()[0])
@@ -93,7 +94,8 @@ class Twins:
             pressure = squeezed * float(sim.scene.phases.numpy()["bulk_modulus"].max())
             return {"raw": 4.0 * dt * volume * pressure / float(min(sim.solver.grid.dx)) / 27.0}
         stiffness = float(sim.scene.phases.numpy()["shear_modulus"].max())
-        return {"pushes[4:5]": 1.0, "pulling[4:13]": max(stiffness, 1e-30)}
+        density = dict.fromkeys(("pushes[4:5]", "pool.overread", "pool.bias"), 1.0)
+        return density | {"pulling[4:13]": max(stiffness, 1e-30)}
 
     def equalise(self) -> None:
         """Give Taichi's twin the state of Warp's."""
@@ -102,7 +104,7 @@ class Twins:
 
     def disturb(self, seed: int) -> None:
         """A random state: places, velocities, stresses, phases and holds that no run would bring about."""
-        rng, pool = np.random.default_rng(seed), self.warp.pool
+        rng, apart, pool = np.random.default_rng(seed), np.random.default_rng([seed, 1]), self.warp.pool
         fields, spacing = pool.fields, self.warp.scene.spacing
         active = np.zeros(pool.size, bool)
         for world, count in enumerate(pool.counts):
@@ -125,6 +127,10 @@ class Twins:
                 values *= rng.uniform(0.97, 1.03, values.shape).astype(np.float32)
             elif name in ("elastic_normal", "elastic_shear"):
                 values += rng.normal(0.0, 0.02, values.shape).astype(np.float32)
+            elif name in ("overread", "bias"):
+                values = apart.normal(0.0, 0.02, values.shape).astype(np.float32)
+            elif name == "enclosure":
+                values = apart.uniform(0.0, 1.0, values.shape).astype(np.float32)
             elif name == "kept":
                 values = rng.uniform(0.0, 1.0, values.shape).astype(np.float32)
             if values.dtype.kind == "f":

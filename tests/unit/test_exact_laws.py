@@ -151,6 +151,13 @@ def test_the_cusp_by_hand(support):
         assert smoothing.cusp_slope(r, support) == exact(-15.0 / (math.pi * support**4) * left)
 
 
+@pytest.mark.parametrize("support", [0.5, 2.0])
+def test_poly6_by_hand(support):
+    for share, left in {0.0: 1.0, 0.5: 0.75, 1.0: 0.0, 1.1: 0.0}.items():
+        peak = 315.0 / (64.0 * math.pi * support**3)
+        assert smoothing.poly6(share * support, support) == exact(peak * left**3)
+
+
 def test_the_spline_by_hand():
     assert smoothing.quadratic_spline(0.5) == exact((0.5, 0.5, 0.0))
     assert smoothing.quadratic_spline(1.0) == exact((0.125, 0.75, 0.125))
