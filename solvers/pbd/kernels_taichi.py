@@ -25,8 +25,9 @@ from ..taichi_bridge import (
     too_fast,
     vec4,
 )
-from .elastic_taichi import KERNELS, NumbersT, gradient, own_density, sloping, summed
-from .kernels_warp import CROWDED, DRAWN, FARTHEST, HURRIED, NEAREST, PARTED, SLACK, SLACK_SOLID
+from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SLACK, SLACK_SOLID
+from .elastic_taichi import KERNELS, NumbersT, flat, gradient, own_density, sloping, summed
+from .kernels_warp import FARTHEST, HURRIED
 from .numbers import PLACE, PUSH
 
 place_of, push_of = reader(PLACE), reader(PUSH)
@@ -105,6 +106,7 @@ def multipliers(
     fill: Floats,
     bias: Floats,
     enclosure: Floats,
+    lack: Floats,
     correction: Vectors,
 ):
     for i in range(held.shape[0]):
@@ -121,14 +123,17 @@ def multipliers(
             slope = vector_at(sums, 1).norm() * num.spacing
             metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
             excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK)
+            short = 0.0
             multiplier = -ti.math.clamp(excess, 0.0, CROWDED) / metric
             if flows:
                 within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
                 wave = dt[world] / num.spacing
                 compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
-                multiplier += DRAWN * enclosure[i] * within * ti.max(1.0 - SLACK - dense, 0.0) / (metric + compliance)
+                inner = enclosure[i] * within
+                short = inner * (1.0 - SLACK - dense)
+                multiplier += DRAWN * inner * ti.max(lack[i], 0.0) / (metric + compliance)
             pushes[3 * i] = places[i]
-            pushes[3 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), 0.0, 0.0)
+            pushes[3 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), short, 0.0)
             pushes[3 * i + 2] = vec4(motion[i][0], motion[i][1], motion[i][2], 0.0)
 
 
@@ -144,10 +149,13 @@ def correct_pair(num, own, begun, other, r):
     lap = ti.max(NEAREST * num.spacing - r.norm(), 0.0)
     push += PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing)
     before = r - (vector_at(own, 8) - vector_at(other, 8))
-    return push / ti.max(before.norm(), 1.0e-9) * before
+    level = other[3] * flat(r.norm(), num.support)
+    sums = vector_into(ti.Vector.zero(ti.f32, 5), 0, push / ti.max(before.norm(), 1.0e-9) * before)
+    sums[3], sums[4] = level, level * other[6]
+    return sums
 
 
-corrected_by = over_pairs(PUSH, 3, correct_pair, pushing_seen)
+corrected_by = over_pairs(PUSH, 5, correct_pair, pushing_seen)
 
 
 @ti.kernel
@@ -171,13 +179,18 @@ def correct(
     fill: Floats,
     bias: Floats,
     enclosure: Floats,
+    lack: Floats,
     correction: Vectors,
 ):
     for i in range(held.shape[0]):
-        if i % capacity < count[i // capacity] and held[i] == FREE:
+        if i % capacity < count[i // capacity]:
             own = push_of(pushes, i)
-            shift = corrected_by(num, box, lists, entries, number, pushes, held, i, own, vec4(0.0))
-            correction[i] = num.over_relaxation * num.spacing * num.spacing * shift
+            sums = corrected_by(num, box, lists, entries, number, pushes, held, i, own, vec4(0.0))
+            if i < lack.shape[0]:  # one zero where nothing is elastic
+                own_level = own[3] * flat(0.0, num.support)
+                lack[i] = (sums[4] + own_level * own[6]) / (sums[3] + own_level)
+            if held[i] == FREE:
+                correction[i] = num.over_relaxation * num.spacing * num.spacing * vector_at(sums, 0)
 
 
 @ti.kernel

@@ -28,6 +28,7 @@ from ..viscosity import ImplicitViscosity, beside
 from . import kernels_warp as kernels
 from .bounds import bounds_of
 from .config import ConfigPBD
+from .constraints_warp import Constraining
 from .elasticity import Elasticity
 from .numbers import (
     MOVING,
@@ -145,7 +146,7 @@ class SolverPBD(Solver):
             self.places = wp.zeros(pool.size * PLACE // 4, dtype=wp.vec4)
             self.pushes = wp.zeros(pool.size * PUSH // 4, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, config.skin * scene.spacing)
-        self.constraining = kernels.Constraining()
+        self.constraining = Constraining()
         self.constraining.dt, self.constraining.phases = scene.dt, scene.phases
         self.constraining.phase_of = pool.phase
         self.constraining.held, self.constraining.mass = pool.held, pool.mass
@@ -154,10 +155,12 @@ class SolverPBD(Solver):
         self.constraining.pushes, self.constraining.fill = self.pushes, self.fill
         self.elastic = Elasticity(scene, pool) if scene.elastic else None
         if self.elastic is None:
-            self.constraining.bias = self.constraining.enclosure = wp.zeros(1, dtype=float, device=scene.device)
+            nothing = wp.zeros(1, dtype=float, device=scene.device)
+            self.constraining.bias = self.constraining.enclosure = self.constraining.lack = nothing
         else:
             self.constraining.bias = self.elastic.straining.bias
             self.constraining.enclosure = self.elastic.straining.enclosure
+            self.constraining.lack = pool.add_field("lack", float)
         self.tool = None if scene.outline is None else tool_of(scene, self.num.support, weights(self.num.support))
         if self.tool is not None:
             self.constraining.tool = self.tool
@@ -178,7 +181,7 @@ class SolverPBD(Solver):
             from . import kernels_taichi
 
             return kernels_taichi.PASSES
-        return kernels.passes(self.scene.outline is not None, self.scene.device.is_cpu)
+        return kernels.passes(self.scene.elastic, self.scene.outline is not None, self.scene.device.is_cpu)
 
     def refresh(self) -> None:
         self.neighbours.refresh()
