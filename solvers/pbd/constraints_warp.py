@@ -105,7 +105,8 @@ and flows is drawn together, too.
 
 The paper sums density with poly6 and moves along the slope of the spiky kernel. Poly6 has a flat top, under which
 particles pair; the spiky kernel itself reads matter in disorder 8 % too dense, which then swells. `cusp` is between
-them: 2 to 5 %. Sums: density, gradient of the own place (3), squares of the others'.
+them: 2 to 5 %, which `bias` takes away (elastic_warp.py). Sums: density, gradient of the own place (3), squares of the
+others'.
 """
 
 

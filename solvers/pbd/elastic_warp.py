@@ -207,6 +207,8 @@ def tooled_strain_finish(
         sums[13] -= found.second[0, 2]
         sums[14] -= found.second[1, 2]
     strain_finish(num, box, data, world, i, own, sums)
+    if found.on == 1:
+        data.overread[i] = 0.0  # the body fills a part of what its density is summed over
 
 
 strain = Pass(Numbers, Straining, MOVING, 24, strain_pair, strain_finish, seen=seen_moving)
@@ -218,7 +220,7 @@ much partners over-read it.
 Any sum reads particles in disorder too dense, the more the sharper its kernel's peak; one that is flat where others
 keep their distance does not, but would not see pairs. So what a particle reads beyond its neighbourhood is judged by
 the sharp one, and the mean of a neighbourhood is brought to that of the flat one: `bias` divides the density
-(kernels_warp.py)."""
+(constraints_warp.py)."""
 
 
 @wp.func

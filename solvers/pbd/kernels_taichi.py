@@ -1,5 +1,5 @@
-"""Position-based fluids in Taichi: the passes of kernels_warp.py with the same arguments, written anew from the same
-equations."""
+"""Position-based fluids in Taichi: the passes of kernels_warp.py and constraints_warp.py with the same arguments,
+written anew from the same equations."""
 
 from types import SimpleNamespace
 

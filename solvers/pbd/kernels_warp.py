@@ -165,7 +165,8 @@ def keep_out(
 def passes(strength: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
     """The passes for one kind of device, of what has strength or has none, beside a rigid body or without one."""
     over_pairs = constraints(strength, tooled) | elastic(tooled)
-    name = "strong_" * strength + "tooled_" * tooled
+    names = {key: "tooled_" * tooled + key for key in over_pairs}
+    names["correct"] = "drawing_" * strength + names["correct"]
     return SimpleNamespace(
         predict=predict,
         apply=apply,
@@ -174,5 +175,5 @@ def passes(strength: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
         wall_friction=wall_friction,
         **({"keep_out": keep_out} if tooled else {}),
         **{kernel.key: kernel for kernel in KERNELS},
-        **{key: one.compiled(name + key, cpu) for key, one in over_pairs.items()},
+        **{key: one.compiled(names[key], cpu) for key, one in over_pairs.items()},
     )

@@ -25,7 +25,7 @@ ROWS = {
     "matter": [*PLACE, VELOCITY, (7, 8), (8, 11), (11, 12)],
     "places": PLACE,
     "pushes": [*PLACE, (4, 5), (5, 6), (6, 7), (8, 11)],
-    "moving": [*PLACE, VELOCITY],
+    "moving": [*PLACE, VELOCITY, (7, 8)],
     "pulling": [*PLACE, (4, 13), (13, 16)],
 }
 STATES = {
