@@ -26,6 +26,7 @@ CROWDED = wp.constant(0.25)  # excess of density that is pushed apart at once: l
 NEAREST = wp.constant(0.5)  # spacings that two keep apart: density alone lets them pair
 PARTED = wp.constant(0.5)  # share of what two are too near that a correction takes away
 SLACK_SOLID = wp.constant(0.1)  # a solid's bulk modulus keeps its density; the constraint only keeps its parts apart
+SCARCE = wp.constant(1.0e-6)  # density of what is enclosed, over that at rest, that is none
 DRAWN = wp.constant(0.5)  # of a lack of density, in an iteration: the stiffest wave in a lattice goes by 1.7 of a whole
 
 
@@ -70,7 +71,7 @@ def multiplier_finish(
     # Lengths are scaled by the spacing to make epsilon a number.
     slopes = (sums[4] + wp.dot(together, together)) * num.spacing * num.spacing
     metric = num.response * slopes + num.relaxation
-    short = float(0.0)
+    short, inside = float(0.0), float(0.0)
     multiplier = -wp.clamp(dense - limit, 0.0, CROWDED) / metric
     if flows:
         # A surface must not be drawn together: what lies within matter is denser than its face, and has others all
@@ -84,7 +85,7 @@ def multiplier_finish(
         multiplier += DRAWN * inside * wp.max(data.lack[i], 0.0) / (metric + compliance)
     store_vec4(data.pushes, 3 * i, wp.vec4(own[0], own[1], own[2], own[3]))
     heft, moved = data.mass[i] / (own[3] * phase.density), data.motion[i]
-    store_vec4(data.pushes, 3 * i + 1, wp.vec4(multiplier, heft, short, 0.0))
+    store_vec4(data.pushes, 3 * i + 1, wp.vec4(multiplier, heft, short, inside))
     store_vec4(data.pushes, 3 * i + 2, wp.vec4(moved[0], moved[1], moved[2], 0.0))
 
 
@@ -124,9 +125,9 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
     - V_j rho_j dx_j. They part along the line between them as the substep began, as bonds do in SHAKE (Ryckaert et al.
     1977): with v = (x - x0) / dt, m x cross v is m x0 cross v, and stays. Sums over spacing squared.
 
-    Where matter is drawn together two sums more find by how much the neighbourhood lacks density on the mean. A pull by
-    what each particle lacks itself would make pairs of those that are apart, and take the noise of a density for a
-    tension: a few tenths of a percent times the bulk modulus are more than a paste's yield stress.
+    Where matter is drawn together two sums more find by how much what is enclosed nearby lacks density on the mean. A
+    pull by what each particle lacks itself would make pairs of those that are apart, and take the noise of a density
+    for a tension: a few tenths of a percent times the bulk modulus are more than a paste's yield stress.
     """
     sums_of = 5 if drawn else 3
     Own, Other, Sums = floats(PUSH + 4), floats(PUSH), floats(sums_of)
@@ -143,7 +144,7 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
         moved = (push / wp.max(wp.length(before), 1.0e-9)) * before
         if wp.static(drawn):
             level = other[3] * flat(distance, num.support)
-            return Sums(moved[0], moved[1], moved[2], level, level * other[6])
+            return Sums(moved[0], moved[1], moved[2], level * other[7], level * other[6])
         else:  # noqa: RET505 - Warp compiles one of the two
             return Sums(moved[0], moved[1], moved[2])
 
@@ -155,7 +156,7 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
             moved += (2.0 * own[4] * num.slope_weight) * found.first
         if wp.static(drawn):
             own_level = own[3] * flat(0.0, num.support)
-            data.lack[i] = (sums[4] + own_level * own[6]) / (sums[3] + own_level)
+            data.lack[i] = (sums[4] + own_level * own[6]) / wp.max(sums[3] + own_level * own[7], SCARCE)
         if data.held[i] == FREE:
             data.correction[i] = (num.over_relaxation * num.spacing * num.spacing) * moved
 

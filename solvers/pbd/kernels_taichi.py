@@ -25,7 +25,7 @@ from ..taichi_bridge import (
     too_fast,
     vec4,
 )
-from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SLACK, SLACK_SOLID
+from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SCARCE, SLACK, SLACK_SOLID
 from .elastic_taichi import KERNELS, NumbersT, flat, gradient, own_density, sloping, summed
 from .kernels_warp import FARTHEST, HURRIED
 from .numbers import PLACE, PUSH
@@ -123,7 +123,7 @@ def multipliers(
             slope = vector_at(sums, 1).norm() * num.spacing
             metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
             excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK)
-            short = 0.0
+            short, inner = 0.0, 0.0
             multiplier = -ti.math.clamp(excess, 0.0, CROWDED) / metric
             if flows:
                 within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
@@ -133,7 +133,7 @@ def multipliers(
                 short = inner * (1.0 - SLACK - dense)
                 multiplier += DRAWN * inner * ti.max(lack[i], 0.0) / (metric + compliance)
             pushes[3 * i] = places[i]
-            pushes[3 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), short, 0.0)
+            pushes[3 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), short, inner)
             pushes[3 * i + 2] = vec4(motion[i][0], motion[i][1], motion[i][2], 0.0)
 
 
@@ -151,7 +151,7 @@ def correct_pair(num, own, begun, other, r):
     before = r - (vector_at(own, 8) - vector_at(other, 8))
     level = other[3] * flat(r.norm(), num.support)
     sums = vector_into(ti.Vector.zero(ti.f32, 5), 0, push / ti.max(before.norm(), 1.0e-9) * before)
-    sums[3], sums[4] = level, level * other[6]
+    sums[3], sums[4] = level * other[7], level * other[6]
     return sums
 
 
@@ -188,7 +188,7 @@ def correct(
             sums = corrected_by(num, box, lists, entries, number, pushes, held, i, own, vec4(0.0))
             if i < lack.shape[0]:  # one zero where nothing is elastic
                 own_level = own[3] * flat(0.0, num.support)
-                lack[i] = (sums[4] + own_level * own[6]) / (sums[3] + own_level)
+                lack[i] = (sums[4] + own_level * own[6]) / ti.max(sums[3] + own_level * own[7], SCARCE)
             if held[i] == FREE:
                 correction[i] = num.over_relaxation * num.spacing * num.spacing * vector_at(sums, 0)
 

@@ -29,8 +29,9 @@ class Numbers:
 
 
 # Floats in the rows that neighbours are asked for. Of density: position, volume. Of its constraints: the same |
-# multiplier, heft, lack of density | motion since the substep began. Of velocities: position, volume | velocity, what
-# the density is over-read by. Of stress: position, volume | stress (9), the traction that pulls back (3).
+# multiplier, heft, lack of density, how far it is enclosed | motion since the substep began. Of velocities: position,
+# volume | velocity, what the density is over-read by. Of stress: position, volume | stress (9), the traction that pulls
+# back (3).
 PLACE, PUSH, MOVING, PULLING = 4, 12, 8, 16
 
 

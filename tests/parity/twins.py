@@ -24,7 +24,7 @@ PLACE, VELOCITY = [(0, 3), (3, 4)], (4, 7)
 ROWS = {
     "matter": [*PLACE, VELOCITY, (7, 8), (8, 11), (11, 12)],
     "places": PLACE,
-    "pushes": [*PLACE, (4, 5), (5, 6), (6, 7), (8, 11)],
+    "pushes": [*PLACE, (4, 5), (5, 6), (6, 7), (7, 8), (8, 11)],
     "moving": [*PLACE, VELOCITY, (7, 8)],
     "pulling": [*PLACE, (4, 13), (13, 16)],
 }
@@ -94,7 +94,9 @@ class Twins:
             pressure = squeezed * float(sim.scene.phases.numpy()["bulk_modulus"].max())
             return {"raw": 4.0 * dt * volume * pressure / float(min(sim.solver.grid.dx)) / 27.0}
         stiffness = float(sim.scene.phases.numpy()["shear_modulus"].max())
-        density = dict.fromkeys(("pushes[4:5]", "pushes[6:7]", "pool.overread", "pool.bias", "pool.lack"), 1.0)
+        density = dict.fromkeys(
+            ("pushes[4:5]", "pushes[6:7]", "pushes[7:8]", "pool.overread", "pool.bias", "pool.lack"), 1.0
+        )
         return density | {"pulling[4:13]": max(stiffness, 1e-30)}
 
     def equalise(self) -> None:
