@@ -19,7 +19,6 @@ wp.set_module_options({"enable_backward": False})
 # corner. The correction multiplies stiffness by up to the inverse square: a straggler with 0.02 breaks any bound on dt.
 # Below that of an edge SPH's particles are stragglers.
 SINGULAR, SOUND, EDGE = wp.constant(0.08), wp.constant(0.12), wp.constant(0.17)
-ROUND = wp.constant(4.0 / 9.0)  # of the identity
 INSIDE, LEANING = wp.constant(0.44), wp.constant(0.36)  # halfway to a face
 
 

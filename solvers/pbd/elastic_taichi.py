@@ -3,7 +3,7 @@ anew from the same equations."""
 
 from fluidbench.method.frame import CARRIED, FREE
 
-from ..corrected import ROUND, SOUND
+from ..corrected import SOUND
 from ..corrected_taichi import (
     elastic_stress,
     from_before,
@@ -159,8 +159,8 @@ def strain(
                     push = ratio * pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
                 own_level = own[3] * flat(0.0, num.support)
                 level = sums[22] + own_level
-                apart = (num.lattice * least_eigenvalue(moment) / ROUND - num.face_moment) / (1.0 - num.face_moment)
-                enclosure[i] = ti.math.clamp(2.0 * apart, 0.0, 1.0)
+                beyond_face = least_eigenvalue(moment) - num.face_moment
+                enclosure[i] = ti.math.clamp(beyond_face / (num.halfway - num.face_moment), 0.0, 1.0)
                 bias[i] = (sums[23] + own_level * own[7]) / level
                 dense = num.weight * (sums[21] + own_density(num, own[3]))
                 overread[i] = enclosure[i] * (dense / (num.flat_weight * level) - 1.0)

@@ -21,7 +21,6 @@ from fluidbench.native.vector_access import store_vec4
 from ..aging import rest_density
 from ..bind import warp_func
 from ..corrected import (
-    ROUND,
     SOUND,
     elastic_stress,
     from_before,
@@ -174,12 +173,11 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
                 data.volume_ratio[i] = ratio
         if is_solid(phase):
             push = ratio * pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-        apart = (num.lattice * least / ROUND - num.face_moment) / (1.0 - num.face_moment)
         own_level = own[3] * flat(0.0, num.support)
         level = sums[22] + own_level
         dense = num.weight * (sums[21] + counted(num, own[3]) * summed(0.0, num.support))
         data.bias[i] = (sums[23] + own_level * own[7]) / level
-        data.enclosure[i] = wp.clamp(2.0 * apart, 0.0, 1.0)
+        data.enclosure[i] = wp.clamp((least - num.face_moment) / (num.halfway - num.face_moment), 0.0, 1.0)
         data.overread[i] = data.enclosure[i] * (dense / (num.flat_weight * level) - 1.0)
         modulus = data.kept[i] * phase.shear_modulus
         # where matter is packed more densely q is larger for the same motion, and so is what the traction does

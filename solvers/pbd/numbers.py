@@ -6,7 +6,8 @@ import numpy as np
 import warp as wp
 
 from ..lattice import lattice, opposed
-from ..smoothing import cusp, cusp_slope, drag_weight, spiky, spiky_slope
+from ..smoothing import cusp, cusp_slope, drag_weight, poly6, spiky, spiky_slope
+from .config import ConfigPBD
 
 
 @wp.struct
@@ -22,7 +23,8 @@ class Numbers:
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
     face: float  # density at the face of a lattice, over that at rest [-]
-    face_moment: float  # least eigenvalue there of the second moment, as bounded, over that within [-]
+    face_moment: float  # least eigenvalue there of the spiky kernel's second moment, as bounded [-]
+    halfway: float  # between that and what it is within [-]
     iterations: float  # of the density constraints in a substep
     hourglass: float  # zeta l^2 of the hourglass control [m^2]
     lattice: float  # makes the second moment of the spiky kernel's slope 1 on a lattice [-]
@@ -33,6 +35,23 @@ class Numbers:
 # volume | velocity, what the density is over-read by. Of stress: position, volume | stress (9), the traction that pulls
 # back (3).
 PLACE, PUSH, MOVING, PULLING = 4, 12, 8, 16
+
+
+def numbers_of(config: ConfigPBD, spacing: float, zeta: float) -> Numbers:
+    """At a spacing [m]; zeta of the hourglass control."""
+    num, ratio = Numbers(), config.support_ratio
+    num.support, num.spacing = ratio * spacing, spacing
+    num.weight = 1.0 / lattice_sum(cusp, ratio)
+    num.flat_weight = 1.0 / lattice_sum(poly6, ratio)
+    num.slope_weight = 1.0 / lattice_sum(spiky, ratio)
+    num.response = response(ratio)
+    num.relaxation, num.over_relaxation = config.relaxation, config.over_relaxation
+    num.face, (num.face_moment, within) = face_level(ratio), moments(ratio)
+    num.halfway = 0.5 * (num.face_moment + within)
+    num.iterations = float(config.iterations)
+    num.hourglass = zeta * (stiffest(ratio) * spacing) ** 2
+    num.lattice = 1.0 / second_moment(ratio)
+    return num
 
 
 def distances(support_ratio: float) -> np.ndarray:
@@ -73,9 +92,9 @@ def face_level(support_ratio: float) -> float:
     return sum(cusp(float(r), support_ratio) for r in half) / lattice_sum(cusp, support_ratio)
 
 
-def face_moment(support_ratio: float) -> float:
-    """4 det M / trace(M)^2 at the face of a cubic half lattice, over that within it (../corrected.py,
-    `least_eigenvalue`); M sums -w' r r^T / |r| of the spiky kernel."""
+def moments(support_ratio: float) -> tuple[float, float]:
+    """Least eigenvalue of the second moment -sum w' r r^T / |r| of the spiky kernel, as `least_eigenvalue` bounds it
+    (../corrected.py), at the face of a cubic half lattice of unit spacing and within it."""
     places, r = lattice(support_ratio), distances(support_ratio)
     weights = np.array([-spiky_slope(float(s), support_ratio) / s if s > 0.0 else 0.0 for s in r])
 
@@ -83,4 +102,4 @@ def face_moment(support_ratio: float) -> float:
         moment = (weights[chosen, None] * places[chosen]).T @ places[chosen]
         return 4.0 * float(np.linalg.det(moment)) / float(np.trace(moment)) ** 2
 
-    return bound(places[:, 2] <= 0) / bound(r >= 0.0)
+    return bound(places[:, 2] <= 0), bound(r >= 0.0)

@@ -21,7 +21,7 @@ from ..conjugate import carried_by, effort_of, footprint_of
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
-from ..smoothing import cusp, poly6, spiky, spiky_slope
+from ..smoothing import cusp, spiky_slope
 from ..tool import table_of, tool_of
 from ..tool_map import Weights
 from ..viscosity import ImplicitViscosity, beside
@@ -30,19 +30,7 @@ from .bounds import bounds_of
 from .config import ConfigPBD
 from .constraints_warp import Constraining
 from .elasticity import Elasticity
-from .numbers import (
-    MOVING,
-    PLACE,
-    PULLING,
-    PUSH,
-    Numbers,
-    face_level,
-    face_moment,
-    lattice_sum,
-    response,
-    second_moment,
-    stiffest,
-)
+from .numbers import MOVING, PLACE, PULLING, PUSH, numbers_of
 
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
@@ -123,19 +111,7 @@ class SolverPBD(Solver):
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
-        self.num = Numbers()
-        self.num.support = config.support_ratio * scene.spacing
-        self.num.spacing = scene.spacing
-        self.num.weight = 1.0 / lattice_sum(cusp, config.support_ratio)
-        self.num.flat_weight = 1.0 / lattice_sum(poly6, config.support_ratio)
-        self.num.slope_weight = 1.0 / lattice_sum(spiky, config.support_ratio)
-        self.num.response = response(config.support_ratio)
-        self.num.relaxation, self.num.over_relaxation = config.relaxation, config.over_relaxation
-        self.num.face, self.num.face_moment = face_level(config.support_ratio), face_moment(config.support_ratio)
-        self.num.iterations = float(config.iterations)
-        length = stiffest(config.support_ratio) * scene.spacing
-        self.num.hourglass = config.zeta(scene.scenario.material) * length * length
-        self.num.lattice = 1.0 / second_moment(config.support_ratio)
+        self.num = numbers_of(config, scene.spacing, config.zeta(scene.scenario.material))
         self.wall_friction_acts = FRICTION in (*scene.box.lower_kind, *scene.box.upper_kind)
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
