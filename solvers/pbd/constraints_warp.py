@@ -25,8 +25,8 @@ NEAREST = wp.constant(0.5)  # spacings that two keep apart: density alone lets t
 PARTED = wp.constant(0.5)  # share of what two are too near that a correction takes away
 SLACK_SOLID = wp.constant(0.1)  # a solid's bulk modulus keeps its density; the constraint only keeps its parts apart
 SCARCE = wp.constant(1.0e-6)  # density of what is enclosed, over that at rest, that is none
-# Of a mean lack of density, in an iteration: a lattice's stiffest wave goes by 1.2 of a whole (by its own lack it would by
-# 1.8), and what answers an iteration late holds below 1.
+# Of a mean lack of density, in an iteration: a lattice's stiffest wave goes by 1.2 of a whole (by its own lack by 1.8),
+# and what answers an iteration late holds below 1.
 DRAWN = wp.constant(0.5)
 
 
