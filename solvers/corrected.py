@@ -87,11 +87,18 @@ def from_before(strain: wp.mat33, along: wp.mat33, h: float):
 
 
 @wp.func
+def symmetric(normal: wp.vec3, shear: wp.vec3):
+    """The matrix with a diagonal, and off it xy, xz, yz."""
+    return wp.mat33(
+        normal[0], shear[0], shear[1], shear[0], normal[1], shear[2], shear[1], shear[2], normal[2]
+    )  # fmt: skip
+
+
+@wp.func
 def elastic_stress(modulus: float, b: wp.vec3, s: wp.vec3, pressure: float):
     """modulus dev(b) - pressure 1 [Pa], the elastic tensor given by its diagonal b and by s: xy, xz, yz."""
     m = modulus * (b[0] + b[1] + b[2]) / 3.0 + pressure
-    xy, xz, yz = modulus * s[0], modulus * s[1], modulus * s[2]
-    return wp.mat33(modulus * b[0] - m, xy, xz, xy, modulus * b[1] - m, yz, xz, yz, modulus * b[2] - m)
+    return symmetric(modulus * b - wp.vec3(m, m, m), modulus * s)
 
 
 @wp.func

@@ -1,7 +1,7 @@
 """The constraints of position-based fluids (Macklin & Mueller 2013, ACM TOG 32:104) in Warp: nothing is denser than at
 rest, what has strength is no less dense within, and no two are too near."""
 
-from dataclasses import replace
+from typing import Any
 
 import warp as wp
 
@@ -9,11 +9,12 @@ from fluidbench.method.frame import FREE
 from fluidbench.native.scene import Box, Phase, is_solid
 from fluidbench.native.vector_access import store_vec4
 
+from ..corrected import symmetric
 from ..images import image_gradient
 from ..pairs import Pass, floats
 from ..tool import Tool, felt
 from .elastic_warp import counted, flat, gradient, sloping, summed
-from .numbers import PLACE, PUSH, Numbers
+from .numbers import PLACE, Numbers, pushing
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -44,6 +45,8 @@ class Constraining:
     fill: wp.array(dtype=float)
     bias: wp.array(dtype=float)  # of the density, by disorder: elastic_warp.py; one zero where nothing is elastic
     enclosure: wp.array(dtype=float)
+    fabric_normal: wp.array(dtype=wp.vec3)  # inverse of the fabric: elastic_warp.py
+    fabric_shear: wp.array(dtype=wp.vec3)
     lack: wp.array(dtype=float)  # of density, mean of the neighbourhood, an iteration ago
     correction: wp.array(dtype=wp.vec3)
     tool: Tool
@@ -56,67 +59,67 @@ def multiplier_pair(num: Numbers, own: floats(PLACE + 4), other: floats(PLACE), 
     return vec5(dense, g[0], g[1], g[2], wp.dot(g, g))
 
 
-@wp.func
-def multiplier_finish(
-    num: Numbers, box: Box, data: Constraining, world: int, i: int, own: floats(PLACE + 4), sums: vec5
-):
-    dense = num.weight * (sums[0] + counted(num, own[3]) * summed(0.0, num.support))
-    together = wp.vec3(sums[1], sums[2], sums[3])
-    phase = data.phases[world, data.phase_of[i]]
-    flows = phase.shear_modulus > 0.0 and not is_solid(phase)
-    if flows:
-        dense /= 1.0 + data.bias[i]
-    data.fill[i] = dense
-    limit = 1.0 + wp.where(is_solid(phase), SLACK_SOLID, SLACK)
-    # Lengths are scaled by the spacing to make epsilon a number.
-    slopes = (sums[4] + wp.dot(together, together)) * num.spacing * num.spacing
-    metric = num.response * slopes + num.relaxation
-    short, inside = float(0.0), float(0.0)
-    multiplier = -wp.clamp(dense - limit, 0.0, CROWDED) / metric
-    if flows:
-        # A surface must not be drawn together: what lies within matter is denser than its face, and has others all
-        # round.
-        within = wp.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
-        inside = data.enclosure[i] * within
-        short = inside * (1.0 - SLACK - dense)
-        # Tension of bulk modulus K: it moves by dt^2 K lack grad W / rho in a substep, however short.
-        wave = data.dt[world] / num.spacing
-        compliance = num.iterations * data.mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
-        multiplier += DRAWN * inside * wp.max(data.lack[i], 0.0) / (metric + compliance)
-    store_vec4(data.pushes, 3 * i, wp.vec4(own[0], own[1], own[2], own[3]))
-    heft, moved = data.mass[i] / (own[3] * phase.density), data.motion[i]
-    store_vec4(data.pushes, 3 * i + 1, wp.vec4(multiplier, heft, short, inside))
-    store_vec4(data.pushes, 3 * i + 2, wp.vec4(moved[0], moved[1], moved[2], 0.0))
+def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
+    """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper). What has
+    strength and flows is drawn together, too.
+
+    The paper sums density with poly6 and moves along the slope of the spiky kernel. Poly6 has a flat top, under which
+    particles pair; the spiky kernel itself reads matter in disorder 8 % too dense, which then swells. `cusp` is between
+    them: 2 to 5 %, which `bias` takes away (elastic_warp.py). Sums: density, gradient of the own place (3), squares of
+    the others'.
+    """
+
+    @wp.func
+    def finish(num: Numbers, box: Box, data: Constraining, world: int, i: int, own: floats(PLACE + 4), sums: vec5):
+        if wp.static(tooled):
+            found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
+            along = num.slope_weight * found.first
+            squares = num.slope_weight * num.slope_weight * found.squares
+            sums += vec5(found.level, along[0], along[1], along[2], squares)
+        dense = num.weight * (sums[0] + counted(num, own[3]) * summed(0.0, num.support))
+        together = wp.vec3(sums[1], sums[2], sums[3])
+        phase = data.phases[world, data.phase_of[i]]
+        flows = phase.shear_modulus > 0.0 and not is_solid(phase)
+        if flows:
+            dense /= 1.0 + data.bias[i]
+        data.fill[i] = dense
+        limit = 1.0 + wp.where(is_solid(phase), SLACK_SOLID, SLACK)
+        # Lengths are scaled by the spacing to make epsilon a number.
+        slopes = (sums[4] + wp.dot(together, together)) * num.spacing * num.spacing
+        metric = num.response * slopes + num.relaxation
+        multiplier = -wp.clamp(dense - limit, 0.0, CROWDED) / metric
+        heft, moved = data.mass[i] / (own[3] * phase.density), data.motion[i]
+        first = wp.static(pushing(drawn) // 4) * i
+        store_vec4(data.pushes, first, wp.vec4(own[0], own[1], own[2], own[3]))
+        store_vec4(data.pushes, first + 1, wp.vec4(moved[0], moved[1], moved[2], heft))
+        if wp.static(drawn):
+            short, inside = float(0.0), float(0.0)
+            normal, shear = wp.vec3(1.0, 1.0, 1.0), wp.vec3()
+            if flows:
+                # A surface must not be drawn together: what lies within matter is denser than its face, and has others
+                # all round.
+                within = wp.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
+                inside = data.enclosure[i] * within
+                short = inside * (1.0 - SLACK - dense)
+                # Tension of bulk modulus K: it moves by dt^2 K lack grad W / rho in a substep, however short.
+                wave = data.dt[world] / num.spacing
+                compliance = num.iterations * data.mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
+                multiplier += DRAWN * inside * wp.max(data.lack[i], 0.0) / (metric + compliance)
+                normal = wp.vec3(data.fabric_normal[i])
+                shear = wp.vec3(data.fabric_shear[i])
+            n, s = multiplier * normal, multiplier * shear
+            store_vec4(data.pushes, first + 2, wp.vec4(n[0], n[1], n[2], s[0]))
+            store_vec4(data.pushes, first + 3, wp.vec4(s[1], s[2], short, inside))
+        else:
+            store_vec4(data.pushes, first + 2, wp.vec4(multiplier, 0.0, 0.0, 0.0))
+
+    return Pass(Numbers, Constraining, PLACE, 5, multiplier_pair, finish)
 
 
 @wp.func
-def tooled_multiplier_finish(
-    num: Numbers, box: Box, data: Constraining, world: int, i: int, own: floats(PLACE + 4), sums: vec5
-):
-    found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
-    together = num.slope_weight * found.first
-    squares = num.slope_weight * num.slope_weight * found.squares
-    sums += vec5(found.level, together[0], together[1], together[2], squares)
-    multiplier_finish(num, box, data, world, i, own, sums)
-
-
-multipliers = Pass(Numbers, Constraining, PLACE, 5, multiplier_pair, multiplier_finish)
-"""Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper). What has strength
-and flows is drawn together, too.
-
-The paper sums density with poly6 and moves along the slope of the spiky kernel. Poly6 has a flat top, under which
-particles pair; the spiky kernel itself reads matter in disorder 8 % too dense, which then swells. `cusp` is between
-them: 2 to 5 %, which `bias` takes away (elastic_warp.py). Sums: density, gradient of the own place (3), squares of the
-others'.
-"""
-
-
-@wp.func
-def seen_pushing(box: Box, data: Constraining, row: floats(PUSH), j: int, code: int):
-    moved = image_gradient(box, wp.vec3(row[8], row[9], row[10]), code)
-    for axis in range(3):
-        row[8 + axis] = moved[axis]
-    return row
+def pushed_to(row: Any, u: wp.vec3):
+    """Where matter that is drawn together is pushed along u, before it is weighed."""
+    return symmetric(wp.vec3(row[8], row[9], row[10]), wp.vec3(row[11], row[12], row[13])) * u
 
 
 def correct_pass(drawn: bool, tooled: bool) -> Pass:
@@ -125,27 +128,42 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
     - V_j rho_j dx_j. They part along the line between them as the substep began, as bonds do in SHAKE (Ryckaert et al.
     1977): with v = (x - x0) / dt, m x cross v is m x0 cross v, and stays. Sums over spacing squared.
 
-    Where matter is drawn together two sums more find by how much what is enclosed nearby lacks density on the mean. A
-    pull by what each particle lacks itself would make pairs of those that are apart, and take the noise of a density
-    for a tension: a few tenths of a percent times the bulk modulus are more than a paste's yield stress.
+    Where matter is drawn together it is pushed along that line times the inverse of the fabric, and two sums more find
+    by how much what is enclosed nearby lacks density on the mean. A pull by what each particle lacks itself would make
+    pairs of those that are apart, and take the noise of a density for a tension: a few tenths of a percent times the
+    bulk modulus are more than a paste's yield stress.
     """
-    sums_of = 5 if drawn else 3
-    Own, Other, Sums = floats(PUSH + 4), floats(PUSH), floats(sums_of)
+    row, sums_of = pushing(drawn), 5 if drawn else 3
+    Own, Other, Sums = floats(row + 4), floats(row), floats(sums_of)
+
+    @wp.func
+    def seen(box: Box, data: Constraining, row: Other, j: int, code: int):
+        moved = image_gradient(box, wp.vec3(row[4], row[5], row[6]), code)
+        for axis in range(3):
+            row[4 + axis] = moved[axis]
+        if wp.static(drawn):
+            sign = image_gradient(box, wp.vec3(1.0, 1.0, 1.0), code)
+            row[11] *= sign[0] * sign[1]
+            row[12] *= sign[0] * sign[2]
+            row[13] *= sign[1] * sign[2]
+        return row
 
     @wp.func
     def pair(num: Numbers, own: Own, other: Other, r: wp.vec3):
         distance = wp.length(r)
-        share = 2.0 * other[5] / (own[5] + other[5])
-        push = (share * (own[4] + other[4]) * num.slope_weight) * other[3] * gradient(distance, num.support)
+        before = r - wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
+        line = (1.0 / wp.max(wp.length(before), 1.0e-9)) * before
+        share = 2.0 * other[7] / (own[7] + other[7])
+        push = (share * num.slope_weight) * other[3] * gradient(distance, num.support)
         lap = wp.max(NEAREST * num.spacing - distance, 0.0)
-        mass = other[3] * other[5]
-        push += PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing)
-        before = r - wp.vec3(own[8] - other[8], own[9] - other[9], own[10] - other[10])
-        moved = (push / wp.max(wp.length(before), 1.0e-9)) * before
+        mass = other[3] * other[7]
+        parted = (PARTED * lap * mass / ((own[3] * own[7] + mass) * num.spacing * num.spacing)) * line
         if wp.static(drawn):
+            moved = push * (pushed_to(own, line) + pushed_to(other, line)) + parted
             level = other[3] * flat(distance, num.support)
-            return Sums(moved[0], moved[1], moved[2], level * other[7], level * other[6])
+            return Sums(moved[0], moved[1], moved[2], level * other[15], level * other[14])
         else:  # noqa: RET505 - Warp compiles one of the two
+            moved = push * (own[8] + other[8]) * line + parted
             return Sums(moved[0], moved[1], moved[2])
 
     @wp.func
@@ -153,17 +171,20 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
         moved = wp.vec3(sums[0], sums[1], sums[2])
         if wp.static(tooled):
             found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
-            moved += (2.0 * own[4] * num.slope_weight) * found.first
+            along = 2.0 * num.slope_weight * found.first
+            if wp.static(drawn):
+                moved += pushed_to(own, along)
+            else:
+                moved += own[8] * along
         if wp.static(drawn):
             own_level = own[3] * flat(0.0, num.support)
-            data.lack[i] = (sums[4] + own_level * own[6]) / wp.max(sums[3] + own_level * own[7], SCARCE)
+            data.lack[i] = (sums[4] + own_level * own[14]) / wp.max(sums[3] + own_level * own[15], SCARCE)
         if data.held[i] == FREE:
             data.correction[i] = (num.over_relaxation * num.spacing * num.spacing) * moved
 
-    return Pass(Numbers, Constraining, PUSH, sums_of, pair, finish, seen=seen_pushing)
+    return Pass(Numbers, Constraining, row, sums_of, pair, finish, seen=seen)
 
 
 def constraints(drawn: bool, tooled: bool) -> dict[str, Pass]:
     """The passes of an iteration, where matter is drawn together or is not, beside a rigid body or without one."""
-    first = replace(multipliers, finish=tooled_multiplier_finish) if tooled else multipliers
-    return {"multipliers": first, "correct": correct_pass(drawn, tooled)}
+    return {"multipliers": multiplier_pass(drawn, tooled), "correct": correct_pass(drawn, tooled)}

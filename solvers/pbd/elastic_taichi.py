@@ -3,7 +3,7 @@ anew from the same equations."""
 
 from fluidbench.method.frame import CARRIED, FREE
 
-from ..corrected import SOUND
+from ..corrected import SINGULAR, SOUND
 from ..corrected_taichi import (
     elastic_stress,
     from_before,
@@ -126,6 +126,8 @@ def strain(
     enclosure: Floats,
     overread: Floats,
     bias: Floats,
+    fabric_normal: Vectors,
+    fabric_shear: Vectors,
     pulling: Quads,
     pulled: Vectors,
 ):
@@ -159,7 +161,12 @@ def strain(
                     push = ratio * pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
                 own_level = own[3] * flat(0.0, num.support)
                 level = sums[22] + own_level
-                beyond_face = least_eigenvalue(moment) - num.face_moment
+                least = least_eigenvalue(moment)
+                evened = ti.math.clamp((least - SINGULAR) / (SOUND - SINGULAR), 0.0, 1.0)
+                fabric = evened * moment.trace() / 3.0 * correction
+                fabric_normal[i] = vec3(fabric[0, 0], fabric[1, 1], fabric[2, 2]) + (1.0 - evened)
+                fabric_shear[i] = vec3(fabric[0, 1], fabric[0, 2], fabric[1, 2])
+                beyond_face = least - num.face_moment
                 enclosure[i] = ti.math.clamp(beyond_face / (num.halfway - num.face_moment), 0.0, 1.0)
                 bias[i] = (sums[23] + own_level * own[7]) / level
                 dense = num.weight * (sums[21] + own_density(num, own[3]))
@@ -209,6 +216,8 @@ def pull(
     enclosure: Floats,
     overread: Floats,
     bias: Floats,
+    fabric_normal: Vectors,
+    fabric_shear: Vectors,
     pulling: Quads,
     pulled: Vectors,
 ):

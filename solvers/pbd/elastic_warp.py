@@ -21,6 +21,7 @@ from fluidbench.native.vector_access import store_vec4
 from ..aging import rest_density
 from ..bind import warp_func
 from ..corrected import (
+    SINGULAR,
     SOUND,
     elastic_stress,
     from_before,
@@ -28,6 +29,7 @@ from ..corrected import (
     mirrored_stress,
     spanned,
     strain_by_chords,
+    symmetric,
     symmetric_inverse,
 )
 from ..flow import pressure, strained
@@ -64,6 +66,8 @@ class Straining:
     enclosure: wp.array(dtype=float)  # 0 at a free surface, 1 from halfway to within on
     overread: wp.array(dtype=float)  # share by which disorder makes the density read too high, times enclosure
     bias: wp.array(dtype=float)  # mean of that over the neighbours
+    fabric_normal: wp.array(dtype=wp.vec3)  # tr(M) / 3 M^-1 of the moment M; 1 where neighbours are all round alike
+    fabric_shear: wp.array(dtype=wp.vec3)
     pulling: wp.array(dtype=wp.vec4)
     pulled: wp.array(dtype=wp.vec3)
     tool: Tool
@@ -140,9 +144,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
     h = data.dt[world]
     stress, back = wp.mat33(), wp.vec3()
     if phase.shear_modulus > 0.0:
-        moment = wp.mat33(
-            sums[9], sums[12], sums[13], sums[12], sums[10], sums[14], sums[13], sums[14], sums[11]
-        )  # fmt: skip
+        moment = symmetric(wp.vec3(sums[9], sums[10], sums[11]), wp.vec3(sums[12], sums[13], sums[14]))
         correction = symmetric_inverse(moment)
         slope = wp.mat33(
             sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]
@@ -178,6 +180,10 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
         dense = num.weight * (sums[21] + counted(num, own[3]) * summed(0.0, num.support))
         data.bias[i] = (sums[23] + own_level * own[7]) / level
         data.enclosure[i] = wp.clamp((least - num.face_moment) / (num.halfway - num.face_moment), 0.0, 1.0)
+        evened = wp.clamp((least - SINGULAR) / (SOUND - SINGULAR), 0.0, 1.0)
+        scale, plain = evened * wp.trace(moment) / 3.0, 1.0 - evened
+        data.fabric_normal[i] = wp.vec3(plain, plain, plain) + scale * wp.get_diag(correction)
+        data.fabric_shear[i] = scale * wp.vec3(correction[0, 1], correction[0, 2], correction[1, 2])
         data.overread[i] = data.enclosure[i] * (dense / (num.flat_weight * level) - 1.0)
         modulus = data.kept[i] * phase.shear_modulus
         # where matter is packed more densely q is larger for the same motion, and so is what the traction does
@@ -218,7 +224,13 @@ much partners over-read it.
 Any sum reads particles in disorder too dense, the more the sharper its kernel's peak; one that is flat where others
 keep their distance does not, but would not see pairs. So what a particle reads beyond its neighbourhood is judged by
 the sharp one, and the mean of a neighbourhood is brought to that of the flat one: `bias` divides the density
-(constraints_warp.py)."""
+(constraints_warp.py).
+
+What constraints push along lines to partners presses as the moment M of these does, the fabric: matter that is squeezed
+has more of them along that axis, and so carries a share of its pressure by itself, as friction would: a column of paste
+slumped as if it were an eighth to a third stronger, at any spacing. Pushed along tr(M) / 3 M^-1 of those lines it is
+pressed alike on all sides, as by a pressure in corrected gradients, and no harder; where pushes along M alone have no
+torque, neither have these, for the two commute."""
 
 
 @wp.func

@@ -25,6 +25,8 @@ class Elasticity:
         data.plastic = plastic_strains(scene, pool)
         data.enclosure = pool.add_field("enclosure", float)
         data.overread, data.bias = pool.add_field("overread", float), pool.add_field("bias", float)
+        data.fabric_normal = pool.add_field("fabric_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0))
+        data.fabric_shear = pool.add_field("fabric_shear", wp.vec3)
         data.kept, data.pulled = self.kept, pool.add_field("pulled", wp.vec3)
         with wp.ScopedDevice(scene.device):
             self.moving = wp.zeros(pool.size * MOVING // 4, dtype=wp.vec4)

@@ -1,6 +1,8 @@
 """Position-based fluids in Taichi: the passes of kernels_warp.py and constraints_warp.py with the same arguments,
 written anew from the same equations."""
 
+from collections.abc import Callable
+from functools import cache
 from types import SimpleNamespace
 
 from fluidbench.method.frame import FREE
@@ -9,7 +11,7 @@ from fluidbench.native.scene import FRICTION, PERIODIC
 
 from ..images import WALL_INSET
 from ..neighbours_taichi import BoxT, ListsT, contained, image_gradient, walled
-from ..pairs_taichi import over_pairs, reader, vector_at, vector_into
+from ..pairs_taichi import over_pairs, reader, symmetric_at, vector_at, vector_into, writer
 from ..taichi_bridge import (
     Floats,
     Forces,
@@ -23,14 +25,15 @@ from ..taichi_bridge import (
     phase_at,
     ti,
     too_fast,
+    vec3,
     vec4,
 )
 from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SCARCE, SLACK, SLACK_SOLID
 from .elastic_taichi import KERNELS, NumbersT, flat, gradient, own_density, sloping, summed
 from .kernels_warp import FARTHEST, HURRIED
-from .numbers import PLACE, PUSH
+from .numbers import PLACE, pushing
 
-place_of, push_of = reader(PLACE), reader(PUSH)
+place_of = reader(PLACE)
 
 
 @ti.func
@@ -85,112 +88,149 @@ def multiplier_pair(num, own, begun, other, r):
 constrained_by = over_pairs(PLACE, 5, multiplier_pair)
 
 
-@ti.kernel
-def multipliers(
-    num: NumbersT,
-    box: BoxT,
-    lists: ListsT,
-    entries: Ints,
-    number: Ints,
-    inside: Ints,
-    capacity: int,
-    count: Ints,
-    places: Quads,
-    dt: Floats,
-    phases: Phases,
-    phase_of: Ints,
-    held: Ints,
-    mass: Floats,
-    motion: Vectors,
-    pushes: Quads,
-    fill: Floats,
-    bias: Floats,
-    enclosure: Floats,
-    lack: Floats,
-    correction: Vectors,
-):
-    for i in range(held.shape[0]):
-        world = i // capacity
-        if i - world * capacity < count[world]:
-            own = place_of(places, i)
-            sums = constrained_by(num, box, lists, entries, number, places, held, i, own, vec4(0.0))
-            dense = num.weight * (sums[0] + own_density(num, own[3]))
-            phase = phase_at(phases, world, phase_of[i])
-            flows = phase.shear_modulus > 0.0 and not is_solid(phase)
-            if flows:
-                dense /= 1.0 + bias[i]
-            fill[i] = dense
-            slope = vector_at(sums, 1).norm() * num.spacing
-            metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
-            excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK)
-            short, inner = 0.0, 0.0
-            multiplier = -ti.math.clamp(excess, 0.0, CROWDED) / metric
-            if flows:
-                within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
-                wave = dt[world] / num.spacing
-                compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
-                inner = enclosure[i] * within
-                short = inner * (1.0 - SLACK - dense)
-                multiplier += DRAWN * inner * ti.max(lack[i], 0.0) / (metric + compliance)
-            pushes[3 * i] = places[i]
-            pushes[3 * i + 1] = vec4(multiplier, mass[i] / (own[3] * phase.density), short, inner)
-            pushes[3 * i + 2] = vec4(motion[i][0], motion[i][1], motion[i][2], 0.0)
+def multipliers_of(drawn: bool) -> Callable:
+    length = pushing(drawn)
+    write = writer(length)
+
+    @ti.kernel
+    def multipliers(
+        num: NumbersT,
+        box: BoxT,
+        lists: ListsT,
+        entries: Ints,
+        number: Ints,
+        inside: Ints,
+        capacity: int,
+        count: Ints,
+        places: Quads,
+        dt: Floats,
+        phases: Phases,
+        phase_of: Ints,
+        held: Ints,
+        mass: Floats,
+        motion: Vectors,
+        pushes: Quads,
+        fill: Floats,
+        bias: Floats,
+        enclosure: Floats,
+        fabric_normal: Vectors,
+        fabric_shear: Vectors,
+        lack: Floats,
+        correction: Vectors,
+    ):
+        for i in range(held.shape[0]):
+            world = i // capacity
+            if i - world * capacity < count[world]:
+                own = place_of(places, i)
+                sums = constrained_by(num, box, lists, entries, number, places, held, i, own, vec4(0.0))
+                dense = num.weight * (sums[0] + own_density(num, own[3]))
+                phase = phase_at(phases, world, phase_of[i])
+                flows = phase.shear_modulus > 0.0 and not is_solid(phase)
+                if flows:
+                    dense /= 1.0 + bias[i]
+                fill[i] = dense
+                slope = vector_at(sums, 1).norm() * num.spacing
+                metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
+                excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK)
+                multiplier = -ti.math.clamp(excess, 0.0, CROWDED) / metric
+                row = vector_into(ti.Vector.zero(ti.f32, length), 4, motion[i])
+                for c in ti.static(range(4)):
+                    row[c] = own[c]
+                row[7] = mass[i] / (own[3] * phase.density)
+                if ti.static(drawn):
+                    normal, shear = vec3(1.0), vec3(0.0)
+                    if flows:
+                        within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
+                        wave = dt[world] / num.spacing
+                        compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
+                        row[15] = enclosure[i] * within
+                        row[14] = row[15] * (1.0 - SLACK - dense)
+                        multiplier += DRAWN * row[15] * ti.max(lack[i], 0.0) / (metric + compliance)
+                        normal, shear = fabric_normal[i], fabric_shear[i]
+                    row = vector_into(vector_into(row, 8, multiplier * normal), 11, multiplier * shear)
+                else:
+                    row[8] = multiplier
+                write(pushes, i, row)
+
+    return multipliers
 
 
-@ti.func
-def pushing_seen(box, extra: ti.template(), row, j, code):
-    return vector_into(row, 8, image_gradient(box, vector_at(row, 8), code))
+def pushing_seen_of(drawn: bool) -> Callable:
+    @ti.func
+    def seen(box, extra: ti.template(), row, j, code):
+        out = vector_into(row, 4, image_gradient(box, vector_at(row, 4), code))
+        if ti.static(drawn):
+            sign = image_gradient(box, vec3(1.0), code)
+            mixed = vec3(sign[0] * sign[1], sign[0] * sign[2], sign[1] * sign[2])
+            out = vector_into(out, 11, mixed * vector_at(row, 11))
+        return out
+
+    return seen
 
 
-@ti.func
-def correct_pair(num, own, begun, other, r):
-    share, mass = 2.0 * other[5] / (own[5] + other[5]), other[3] * other[5]
-    push = share * (own[4] + other[4]) * num.slope_weight * other[3] * gradient(r.norm(), num.support)
-    lap = ti.max(NEAREST * num.spacing - r.norm(), 0.0)
-    push += PARTED * lap * mass / ((own[3] * own[5] + mass) * num.spacing * num.spacing)
-    before = r - (vector_at(own, 8) - vector_at(other, 8))
-    level = other[3] * flat(r.norm(), num.support)
-    sums = vector_into(ti.Vector.zero(ti.f32, 5), 0, push / ti.max(before.norm(), 1.0e-9) * before)
-    sums[3], sums[4] = level * other[7], level * other[6]
-    return sums
+def correct_pair_of(drawn: bool) -> Callable:
+    @ti.func
+    def pair(num, own, begun, other, r):
+        share, mass = 2.0 * other[7] / (own[7] + other[7]), other[3] * other[7]
+        push = share * num.slope_weight * other[3] * gradient(r.norm(), num.support)
+        lap = ti.max(NEAREST * num.spacing - r.norm(), 0.0)
+        parted = PARTED * lap * mass / ((own[3] * own[7] + mass) * num.spacing * num.spacing)
+        before = r - (vector_at(own, 4) - vector_at(other, 4))
+        line = before / ti.max(before.norm(), 1.0e-9)
+        sums = ti.Vector.zero(ti.f32, 5)
+        if ti.static(drawn):
+            pressed = (symmetric_at(own, 8) + symmetric_at(other, 8)) @ line
+            level = other[3] * flat(r.norm(), num.support)
+            sums = vector_into(sums, 0, push * pressed + parted * line)
+            sums[3], sums[4] = level * other[15], level * other[14]
+        else:
+            sums = vector_into(sums, 0, (push * (own[8] + other[8]) + parted) * line)
+        return sums
+
+    return pair
 
 
-corrected_by = over_pairs(PUSH, 5, correct_pair, pushing_seen)
+def correct_of(drawn: bool) -> Callable:
+    row_of = reader(pushing(drawn))
+    corrected_by = over_pairs(pushing(drawn), 5, correct_pair_of(drawn), pushing_seen_of(drawn))
 
+    @ti.kernel
+    def correct(
+        num: NumbersT,
+        box: BoxT,
+        lists: ListsT,
+        entries: Ints,
+        number: Ints,
+        inside: Ints,
+        capacity: int,
+        count: Ints,
+        pushes: Quads,
+        dt: Floats,
+        phases: Phases,
+        phase_of: Ints,
+        held: Ints,
+        mass: Floats,
+        motion: Vectors,
+        pushed: Quads,
+        fill: Floats,
+        bias: Floats,
+        enclosure: Floats,
+        fabric_normal: Vectors,
+        fabric_shear: Vectors,
+        lack: Floats,
+        correction: Vectors,
+    ):
+        for i in range(held.shape[0]):
+            if i % capacity < count[i // capacity]:
+                own = row_of(pushes, i)
+                sums = corrected_by(num, box, lists, entries, number, pushes, held, i, own, vec4(0.0))
+                if ti.static(drawn):
+                    own_level = own[3] * flat(0.0, num.support)
+                    lack[i] = (sums[4] + own_level * own[14]) / ti.max(sums[3] + own_level * own[15], SCARCE)
+                if held[i] == FREE:
+                    correction[i] = num.over_relaxation * num.spacing * num.spacing * vector_at(sums, 0)
 
-@ti.kernel
-def correct(
-    num: NumbersT,
-    box: BoxT,
-    lists: ListsT,
-    entries: Ints,
-    number: Ints,
-    inside: Ints,
-    capacity: int,
-    count: Ints,
-    pushes: Quads,
-    dt: Floats,
-    phases: Phases,
-    phase_of: Ints,
-    held: Ints,
-    mass: Floats,
-    motion: Vectors,
-    pushed: Quads,
-    fill: Floats,
-    bias: Floats,
-    enclosure: Floats,
-    lack: Floats,
-    correction: Vectors,
-):
-    for i in range(held.shape[0]):
-        if i % capacity < count[i // capacity]:
-            own = push_of(pushes, i)
-            sums = corrected_by(num, box, lists, entries, number, pushes, held, i, own, vec4(0.0))
-            if i < lack.shape[0]:  # one zero where nothing is elastic
-                own_level = own[3] * flat(0.0, num.support)
-                lack[i] = (sums[4] + own_level * own[6]) / ti.max(sums[3] + own_level * own[7], SCARCE)
-            if held[i] == FREE:
-                correction[i] = num.over_relaxation * num.spacing * num.spacing * vector_at(sums, 0)
+    return correct
 
 
 @ti.kernel
@@ -289,13 +329,16 @@ def wall_friction(
             velocity[i] = v
 
 
-PASSES = SimpleNamespace(
-    predict=predict,
-    multipliers=multipliers,
-    correct=correct,
-    apply=apply,
-    velocities=velocities,
-    follow=follow,
-    wall_friction=wall_friction,
-    **KERNELS,
-)
+@cache
+def passes(strength: bool) -> SimpleNamespace:
+    """The passes, of what has strength or has none."""
+    return SimpleNamespace(
+        predict=predict,
+        multipliers=multipliers_of(strength),
+        correct=correct_of(strength),
+        apply=apply,
+        velocities=velocities,
+        follow=follow,
+        wall_friction=wall_friction,
+        **KERNELS,
+    )

@@ -166,7 +166,7 @@ def passes(strength: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
     """The passes for one kind of device, of what has strength or has none, beside a rigid body or without one."""
     over_pairs = constraints(strength, tooled) | elastic(tooled)
     names = {key: "tooled_" * tooled + key for key in over_pairs}
-    names["correct"] = "drawing_" * strength + names["correct"]
+    names |= {key: "drawing_" * strength + names[key] for key in ("multipliers", "correct")}
     return SimpleNamespace(
         predict=predict,
         apply=apply,

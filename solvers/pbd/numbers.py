@@ -30,11 +30,16 @@ class Numbers:
     lattice: float  # makes the second moment of the spiky kernel's slope 1 on a lattice [-]
 
 
-# Floats in the rows that neighbours are asked for. Of density: position, volume. Of its constraints: the same |
-# multiplier, heft, lack of density, how far it is enclosed | motion since the substep began. Of velocities: position,
-# volume | velocity, what the density is over-read by. Of stress: position, volume | stress (9), the traction that pulls
-# back (3).
-PLACE, PUSH, MOVING, PULLING = 4, 12, 8, 16
+# Floats in the rows that neighbours are asked for. Of density: position, volume. Of its constraints: the same | motion
+# since the substep began, heft | multiplier; where matter is drawn together (DRAWING) that times the inverse of the
+# fabric (6), lack of density, how far it is enclosed. Of velocities: position, volume | velocity, what the density is
+# over-read by. Of stress: position, volume | stress (9), the traction that pulls back (3).
+PLACE, PUSH, DRAWING, MOVING, PULLING = 4, 12, 16, 8, 16
+
+
+def pushing(drawn: bool) -> int:
+    """Floats in a row of the constraints, where matter is drawn together or is not."""
+    return DRAWING if drawn else PUSH
 
 
 def numbers_of(config: ConfigPBD, spacing: float, zeta: float) -> Numbers:

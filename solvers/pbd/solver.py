@@ -30,7 +30,7 @@ from .bounds import bounds_of
 from .config import ConfigPBD
 from .constraints_warp import Constraining
 from .elasticity import Elasticity
-from .numbers import MOVING, PLACE, PULLING, PUSH, numbers_of
+from .numbers import MOVING, PLACE, PULLING, numbers_of, pushing
 
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
@@ -120,7 +120,7 @@ class SolverPBD(Solver):
             self.spans = wp.zeros_like(scene.dt)
             self.fill = wp.ones(pool.size, dtype=float)
             self.places = wp.zeros(pool.size * PLACE // 4, dtype=wp.vec4)
-            self.pushes = wp.zeros(pool.size * PUSH // 4, dtype=wp.vec4)
+            self.pushes = wp.zeros(pool.size * pushing(scene.elastic) // 4, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, config.skin * scene.spacing)
         self.constraining = Constraining()
         self.constraining.dt, self.constraining.phases = scene.dt, scene.phases
@@ -133,9 +133,11 @@ class SolverPBD(Solver):
         if self.elastic is None:
             nothing = wp.zeros(1, dtype=float, device=scene.device)
             self.constraining.bias = self.constraining.enclosure = self.constraining.lack = nothing
+            self.constraining.fabric_normal = self.constraining.fabric_shear = self.still[:1]
         else:
-            self.constraining.bias = self.elastic.straining.bias
-            self.constraining.enclosure = self.elastic.straining.enclosure
+            seen = self.elastic.straining
+            self.constraining.bias, self.constraining.enclosure = seen.bias, seen.enclosure
+            self.constraining.fabric_normal, self.constraining.fabric_shear = seen.fabric_normal, seen.fabric_shear
             self.constraining.lack = pool.add_field("lack", float)
         self.tool = None if scene.outline is None else tool_of(scene, self.num.support, weights(self.num.support))
         if self.tool is not None:
@@ -156,7 +158,7 @@ class SolverPBD(Solver):
         if backend == "taichi":
             from . import kernels_taichi
 
-            return kernels_taichi.PASSES
+            return kernels_taichi.passes(self.scene.elastic)
         return kernels.passes(self.scene.elastic, self.scene.outline is not None, self.scene.device.is_cpu)
 
     def refresh(self) -> None:
@@ -334,7 +336,7 @@ class SolverPBD(Solver):
 
     def traffic(self) -> dict[str, float]:
         """Implicit viscosity left out."""
-        rows = [PLACE, PUSH] * self.config.iterations + [MOVING, PULLING] * self.scene.elastic
+        rows = [PLACE, pushing(self.scene.elastic)] * self.config.iterations + [MOVING, PULLING] * self.scene.elastic
         return self.neighbours.traffic(rows)
 
     def footprint(self) -> dict[str, int]:

@@ -24,15 +24,18 @@ PLACE, VELOCITY = [(0, 3), (3, 4)], (4, 7)
 ROWS = {
     "matter": [*PLACE, VELOCITY, (7, 8), (8, 11), (11, 12)],
     "places": PLACE,
-    "pushes": [*PLACE, (4, 5), (5, 6), (6, 7), (7, 8), (8, 11)],
     "moving": [*PLACE, VELOCITY, (7, 8)],
     "pulling": [*PLACE, (4, 13), (13, 16)],
 }
-STATES = {
-    8: [*PLACE, VELOCITY, (7, 8)],
-    12: [*PLACE, VELOCITY, *((k, k + 1) for k in range(7, 12))],
-    20: [*PLACE, VELOCITY, (7, 16), (16, 19)],
-    24: [*PLACE, VELOCITY, (7, 16), (16, 19), *((k, k + 1) for k in range(20, 24))],
+PUSHES = [*PLACE, (4, 7), (7, 8)]
+BY_WIDTH = {
+    "pushes": {12: [*PUSHES, (8, 9)], 16: [*PUSHES, (8, 14), (14, 15), (15, 16)]},
+    "state": {
+        8: [*PLACE, VELOCITY, (7, 8)],
+        12: [*PLACE, VELOCITY, *((k, k + 1) for k in range(7, 12))],
+        20: [*PLACE, VELOCITY, (7, 16), (16, 19)],
+        24: [*PLACE, VELOCITY, (7, 16), (16, 19), *((k, k + 1) for k in range(20, 24))],
+    },
 }
 
 
@@ -94,10 +97,9 @@ class Twins:
             pressure = squeezed * float(sim.scene.phases.numpy()["bulk_modulus"].max())
             return {"raw": 4.0 * dt * volume * pressure / float(min(sim.solver.grid.dx)) / 27.0}
         stiffness = float(sim.scene.phases.numpy()["shear_modulus"].max())
-        density = dict.fromkeys(
-            ("pushes[4:5]", "pushes[6:7]", "pushes[7:8]", "pool.overread", "pool.bias", "pool.lack"), 1.0
-        )
-        return density | {"pulling[4:13]": max(stiffness, 1e-30)}
+        pushes = [f"pushes[{first}:{last}]" for first, last in ((8, 9), (8, 14), (14, 15), (15, 16))]
+        fields = [f"pool.{name}" for name in ("overread", "bias", "lack", "fabric_shear")]
+        return dict.fromkeys(pushes + fields, 1.0) | {"pulling[4:13]": max(stiffness, 1e-30)}
 
     def equalise(self) -> None:
         """Give Taichi's twin the state of Warp's."""
@@ -129,6 +131,8 @@ class Twins:
                 values *= rng.uniform(0.97, 1.03, values.shape).astype(np.float32)
             elif name in ("elastic_normal", "elastic_shear"):
                 values += rng.normal(0.0, 0.02, values.shape).astype(np.float32)
+            elif name in ("fabric_normal", "fabric_shear"):
+                values += apart.normal(0.0, 0.1, values.shape).astype(np.float32)
             elif name in ("overread", "bias", "lack"):
                 values = apart.normal(0.0, 0.02, values.shape).astype(np.float32)
             elif name == "enclosure":
@@ -176,7 +180,7 @@ class Twins:
             if name in BY_CHANCE and by_chance:
                 continue
             a, b = self.ours[name].numpy(), self.theirs[name].numpy()
-            if self.method != "mpm" and (name in ROWS or name == "state"):
+            if self.method != "mpm" and (name in ROWS or name in BY_WIDTH):
                 yield from self._rows(name, a, b)
             elif self.method == "mpm" and name in GRID:
                 yield from self._nodes(name, a, b)
@@ -215,7 +219,7 @@ class Twins:
         if len(a) < size:  # not used by this scene
             return
         a, b = a.reshape(size, -1), b.reshape(size, -1)
-        for first, last in ROWS.get(name) or STATES[a.shape[1]]:
+        for first, last in ROWS.get(name) or BY_WIDTH[name][a.shape[1]]:
             x, y = a[:, first:last], b[:, first:last]
             scale = max(float(np.abs(x).max()), self.least.get(f"{name}[{first}:{last}]", 1e-30))
             off = float(np.abs(x.astype(float) - y).max()) / scale
