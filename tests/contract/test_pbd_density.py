@@ -6,7 +6,7 @@ import pytest
 
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
-from solvers.pbd.numbers import face_level, lattice_sum, moments
+from solvers.pbd.numbers import DRAWING, face_level, lattice_sum, moments
 from solvers.smoothing import cusp, poly6
 
 from ..conftest import scenario
@@ -17,13 +17,13 @@ FACES = ("x_lower", "x_upper", "y_lower", "y_upper", "z_lower", "z_upper")
 PASTE = {"density": 1000.0, "youngs_modulus": 6e3, "yield_stress": 60.0}
 
 
-def block(device, walls, room, **more):
+def block(device, walls, room, side=SIDE, **more):
     """A cube of paste in a domain that leaves so much room on all sides, read twice: what disorder adds to the
     density is that of a substep before."""
     made = scenario(
         material=PASTE,
-        domain={"lower": [-room] * 3, "upper": [SIDE + room] * 3, "walls": walls},
-        bodies=[{"kind": "box", "center": [SIDE / 2] * 3, "size": [SIDE] * 3}],
+        domain={"lower": [-room] * 3, "upper": [side + room] * 3, "walls": walls},
+        bodies=[{"kind": "box", "center": [side / 2] * 3, "size": [side] * 3}],
         gravity=[0, 0, 0],
         spacing=D,
         **more,
@@ -79,6 +79,37 @@ def test_disorder_is_read_as_a_flat_kernel_reads_it(seed, device):
     # what a particle reads beyond its neighbourhood stays the sharp kernel's: under the flat one pairs would not show
     assert seen["fill"] == pytest.approx(sharp / (1.0 + seen["bias"]), rel=1e-4)
     assert seen["bias"].std() < 0.5 * seen["overread"].std()
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_squeezed_matter_is_pressed_alike_on_all_sides(device):
+    """A pressure that falls evenly moves what lies within as far along one axis as along another."""
+    side = 16 * D
+    sim, _ = block(device, {}, 0.06, side)
+    pool, solver, count = sim.pool, sim.solver, sum(sim.pool.counts)
+    squeezed = pool.position.numpy()
+    squeezed[:count] = side / 2 + (squeezed[:count] - side / 2) * [1.0 / np.sqrt(0.8), 1.0 / np.sqrt(0.8), 0.8]
+    pool.position.assign(squeezed)
+    for name in ("predict", "lists", "pack", "strain", "multipliers"):
+        getattr(solver, name)()
+    solver.backend.wait()
+    within = np.abs(squeezed[:count] - side / 2).max(axis=1) < D
+    assert within.sum() == 8
+
+    def moved(axis, even):
+        rows = solver.pushes.numpy().reshape(-1, DRAWING)
+        fabric = np.concatenate([pool.fields[f"fabric_{part}"].numpy() for part in ("normal", "shear")], axis=1)
+        rows[:, 8:14] = rows[:, [axis]] * (fabric if even else [1, 1, 1, 0, 0, 0])
+        solver.pushes.assign(rows.reshape(-1, 4))
+        solver.correct()
+        solver.backend.wait()
+        return solver.correction.numpy()[:count][within]
+
+    along, across = moved(0, True), moved(2, True)
+    assert along[:, 0] == pytest.approx(across[:, 2], rel=1e-3)
+    assert np.abs(along[:, 1:]).max() < 1e-3 * np.abs(along[:, 0]).max()
+    plain = moved(2, False)[:, 2].mean() / moved(0, False)[:, 0].mean()
+    assert plain > 1.05
 
 
 @pytest.mark.parametrize("sum_at_face", [face_level, lambda ratio: moments(ratio)[0] / moments(ratio)[1]])
