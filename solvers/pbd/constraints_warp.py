@@ -152,17 +152,19 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
     def pair(num: Numbers, own: Own, other: Other, r: wp.vec3):
         distance = wp.length(r)
         before = r - wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
-        line = (1.0 / wp.max(wp.length(before), 1.0e-9)) * before
-        share = 2.0 * other[7] / (own[7] + other[7])
-        push = (share * num.slope_weight) * other[3] * gradient(distance, num.support)
+        apart = wp.length(before)
+        line = (1.0 / wp.max(apart, 1.0e-9)) * before
+        weight = (2.0 * other[7] / (own[7] + other[7]) * num.slope_weight) * other[3]
         lap = wp.max(NEAREST * num.spacing - distance, 0.0)
         mass = other[3] * other[7]
         parted = (PARTED * lap * mass / ((own[3] * own[7] + mass) * num.spacing * num.spacing)) * line
         if wp.static(drawn):
+            push = weight * gradient(apart, num.support)  # as the moment was summed, or there would be a torque
             moved = push * (pushed_to(own, line) + pushed_to(other, line)) + parted
             level = other[3] * flat(distance, num.support)
             return Sums(moved[0], moved[1], moved[2], level * other[15], level * other[14])
         else:  # noqa: RET505 - Warp compiles one of the two
+            push = weight * gradient(distance, num.support)
             moved = push * (own[8] + other[8]) * line + parted
             return Sums(moved[0], moved[1], moved[2])
 

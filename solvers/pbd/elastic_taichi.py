@@ -162,7 +162,7 @@ def strain(
                 own_level = own[3] * flat(0.0, num.support)
                 level = sums[22] + own_level
                 least = least_eigenvalue(moment)
-                evened = ti.math.clamp((least - SINGULAR) / (SOUND - SINGULAR), 0.0, 1.0)
+                evened = num.evened * ti.math.clamp((least - SINGULAR) / (SOUND - SINGULAR), 0.0, 1.0)
                 fabric = evened * moment.trace() / 3.0 * correction
                 fabric_normal[i] = vec3(fabric[0, 0], fabric[1, 1], fabric[2, 2]) + (1.0 - evened)
                 fabric_shear[i] = vec3(fabric[0, 1], fabric[0, 2], fabric[1, 2])

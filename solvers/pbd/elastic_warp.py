@@ -180,7 +180,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
         dense = num.weight * (sums[21] + counted(num, own[3]) * summed(0.0, num.support))
         data.bias[i] = (sums[23] + own_level * own[7]) / level
         data.enclosure[i] = wp.clamp((least - num.face_moment) / (num.halfway - num.face_moment), 0.0, 1.0)
-        evened = wp.clamp((least - SINGULAR) / (SOUND - SINGULAR), 0.0, 1.0)
+        evened = num.evened * wp.clamp((least - SINGULAR) / (SOUND - SINGULAR), 0.0, 1.0)
         scale, plain = evened * wp.trace(moment) / 3.0, 1.0 - evened
         data.fabric_normal[i] = wp.vec3(plain, plain, plain) + scale * wp.get_diag(correction)
         data.fabric_shear[i] = scale * wp.vec3(correction[0, 1], correction[0, 2], correction[1, 2])

@@ -171,9 +171,8 @@ def pushing_seen_of(drawn: bool) -> Callable:
 def correct_pair_of(drawn: bool) -> Callable:
     @ti.func
     def pair(num, own, begun, other, r):
-        share, mass = 2.0 * other[7] / (own[7] + other[7]), other[3] * other[7]
-        push = share * num.slope_weight * other[3] * gradient(r.norm(), num.support)
-        lap = ti.max(NEAREST * num.spacing - r.norm(), 0.0)
+        weight = 2.0 * other[7] / (own[7] + other[7]) * num.slope_weight * other[3]
+        lap, mass = ti.max(NEAREST * num.spacing - r.norm(), 0.0), other[3] * other[7]
         parted = PARTED * lap * mass / ((own[3] * own[7] + mass) * num.spacing * num.spacing)
         before = r - (vector_at(own, 4) - vector_at(other, 4))
         line = before / ti.max(before.norm(), 1.0e-9)
@@ -181,9 +180,10 @@ def correct_pair_of(drawn: bool) -> Callable:
         if ti.static(drawn):
             pressed = (symmetric_at(own, 8) + symmetric_at(other, 8)) @ line
             level = other[3] * flat(r.norm(), num.support)
-            sums = vector_into(sums, 0, push * pressed + parted * line)
+            sums = vector_into(sums, 0, weight * gradient(before.norm(), num.support) * pressed + parted * line)
             sums[3], sums[4] = level * other[15], level * other[14]
         else:
+            push = weight * gradient(r.norm(), num.support)
             sums = vector_into(sums, 0, (push * (own[8] + other[8]) + parted) * line)
         return sums
 

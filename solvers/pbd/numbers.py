@@ -5,6 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import warp as wp
 
+from fluidbench.scenario.material import Material
+
 from ..lattice import lattice, opposed
 from ..smoothing import cusp, cusp_slope, drag_weight, poly6, spiky, spiky_slope
 from .config import ConfigPBD
@@ -27,6 +29,7 @@ class Numbers:
     halfway: float  # between that and what it is within [-]
     iterations: float  # of the density constraints in a substep
     hourglass: float  # zeta l^2 of the hourglass control [m^2]
+    evened: float  # 1 where pushes go along the inverse of the fabric [-]
     lattice: float  # makes the second moment of the spiky kernel's slope 1 on a lattice [-]
 
 
@@ -42,8 +45,9 @@ def pushing(drawn: bool) -> int:
     return DRAWING if drawn else PUSH
 
 
-def numbers_of(config: ConfigPBD, spacing: float, zeta: float) -> Numbers:
-    """At a spacing [m]; zeta of the hourglass control."""
+def numbers_of(config: ConfigPBD, spacing: float, material: Material) -> Numbers:
+    """At a spacing [m]. In what expands pushes are left as they are: to partners of other densities they are shared out
+    by mass, and along the inverse of the fabric that has a torque; and births leave no fabric that lasts."""
     num, ratio = Numbers(), config.support_ratio
     num.support, num.spacing = ratio * spacing, spacing
     num.weight = 1.0 / lattice_sum(cusp, ratio)
@@ -54,7 +58,8 @@ def numbers_of(config: ConfigPBD, spacing: float, zeta: float) -> Numbers:
     num.face, (num.face_moment, within) = face_level(ratio), moments(ratio)
     num.halfway = 0.5 * (num.face_moment + within)
     num.iterations = float(config.iterations)
-    num.hourglass = zeta * (stiffest(ratio) * spacing) ** 2
+    num.hourglass = config.zeta(material) * (stiffest(ratio) * spacing) ** 2
+    num.evened = float(material.expansion is None)
     num.lattice = 1.0 / second_moment(ratio)
     return num
 

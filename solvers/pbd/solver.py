@@ -111,7 +111,7 @@ class SolverPBD(Solver):
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
-        self.num = numbers_of(config, scene.spacing, config.zeta(scene.scenario.material))
+        self.num = numbers_of(config, scene.spacing, scene.scenario.material)
         self.wall_friction_acts = FRICTION in (*scene.box.lower_kind, *scene.box.upper_kind)
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
