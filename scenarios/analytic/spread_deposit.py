@@ -59,7 +59,4 @@ CASE = Case(
     causes={
         "mpm": "a deposit five cells thick: 0.116 at H / 20, 0.088 at H / 30, 0.069 at H / 40",
     },
-    exempt={
-        "pbd": "a foot of two or three particles, whose rows do not slide: 0.119 at H / 20, a slump of 0.55 for 0.61",
-    },
 )
