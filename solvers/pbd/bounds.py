@@ -1,4 +1,4 @@
-"""The bounds on a step of PBD: what it moves in one, for nothing makes it unstable."""
+"""The bounds on a step of PBD: what it moves in one, and what constraints can push; stability itself sets none."""
 
 import math
 

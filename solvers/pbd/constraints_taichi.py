@@ -10,7 +10,7 @@ from ..pairs_taichi import over_pairs, reader, symmetric_at, vector_at, vector_i
 from ..taichi_bridge import Floats, Ints, Phases, Quads, Vectors, is_solid, phase_at, ti, vec3, vec4
 from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SCARCE, SLACK, SLACK_SOLID
 from .elastic_taichi import NumbersT, flat, gradient, own_density, sloping, summed
-from .numbers import PLACE, pushing
+from .numbers import PLACE, push_row
 
 place_of = reader(PLACE)
 
@@ -27,7 +27,7 @@ constrained_by = over_pairs(PLACE, 5, multiplier_pair)
 
 
 def multipliers_of(drawn: bool) -> Callable:
-    length = pushing(drawn)
+    length = push_row(drawn)
     write = writer(length)
 
     @ti.kernel
@@ -106,7 +106,7 @@ def pushing_seen_of(drawn: bool) -> Callable:
     return seen
 
 
-def correct_pair_of(drawn: bool) -> Callable:
+def correct_pair_of(drawn: bool, sums_of: int) -> Callable:
     @ti.func
     def pair(num, own, begun, other, r):
         weight = 2.0 * other[7] / (own[7] + other[7]) * num.slope_weight * other[3]
@@ -114,7 +114,7 @@ def correct_pair_of(drawn: bool) -> Callable:
         parted = PARTED * lap * mass / ((own[3] * own[7] + mass) * num.spacing * num.spacing)
         before = r - (vector_at(own, 4) - vector_at(other, 4))
         line = before / ti.max(before.norm(), 1.0e-9)
-        sums = ti.Vector.zero(ti.f32, 5)
+        sums = ti.Vector.zero(ti.f32, sums_of)
         if ti.static(drawn):
             pressed = (symmetric_at(own, 8) + symmetric_at(other, 8)) @ line
             level = other[3] * flat(r.norm(), num.support)
@@ -129,8 +129,9 @@ def correct_pair_of(drawn: bool) -> Callable:
 
 
 def correct_of(drawn: bool) -> Callable:
-    row_of = reader(pushing(drawn))
-    corrected_by = over_pairs(pushing(drawn), 5, correct_pair_of(drawn), pushing_seen_of(drawn))
+    row, sums_of = push_row(drawn), 5 if drawn else 3
+    row_of = reader(row)
+    corrected_by = over_pairs(row, sums_of, correct_pair_of(drawn, sums_of), pushing_seen_of(drawn))
 
     @ti.kernel
     def correct(

@@ -14,7 +14,7 @@ from ..images import image_gradient
 from ..pairs import Pass, floats
 from ..tool import Tool, felt
 from .elastic_warp import counted, flat, gradient, sloping, summed
-from .numbers import PLACE, Numbers, pushing
+from .numbers import PLACE, Numbers, push_row
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -59,6 +59,20 @@ def multiplier_pair(num: Numbers, own: floats(PLACE + 4), other: floats(PLACE), 
     return vec5(dense, g[0], g[1], g[2], wp.dot(g, g))
 
 
+@wp.func
+def within(num: Numbers, dense: float):
+    """How far what is so dense lies within matter, from 0 at the face of a lattice to 1: a surface must not be drawn
+    together."""
+    return wp.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
+
+
+@wp.func
+def drawing_compliance(num: Numbers, phase: Phase, density: float, dt: float):
+    """Of a tension of bulk modulus K, which moves by dt^2 K lack grad W / rho in a substep, however short [-]."""
+    wave = dt / num.spacing
+    return density / (phase.bulk_modulus * wave * wave)
+
+
 def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
     """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper). What has
     strength and flows is drawn together, too.
@@ -73,9 +87,9 @@ def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
     def finish(num: Numbers, box: Box, data: Constraining, world: int, i: int, own: floats(PLACE + 4), sums: vec5):
         if wp.static(tooled):
             found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
-            along = num.slope_weight * found.first
+            own_slope = num.slope_weight * found.first
             squares = num.slope_weight * num.slope_weight * found.squares
-            sums += vec5(found.level, along[0], along[1], along[2], squares)
+            sums += vec5(found.level, own_slope[0], own_slope[1], own_slope[2], squares)
         dense = num.weight * (sums[0] + counted(num, own[3]) * summed(0.0, num.support))
         together = wp.vec3(sums[1], sums[2], sums[3])
         phase = data.phases[world, data.phase_of[i]]
@@ -89,27 +103,20 @@ def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
         metric = num.response * slopes + num.relaxation
         multiplier = -wp.clamp(dense - limit, 0.0, CROWDED) / metric
         heft, moved = data.mass[i] / (own[3] * phase.density), data.motion[i]
-        first = wp.static(pushing(drawn) // 4) * i
+        first = wp.static(push_row(drawn) // 4) * i
         store_vec4(data.pushes, first, wp.vec4(own[0], own[1], own[2], own[3]))
         store_vec4(data.pushes, first + 1, wp.vec4(moved[0], moved[1], moved[2], heft))
         if wp.static(drawn):
-            short, inside = float(0.0), float(0.0)
-            normal, shear = wp.vec3(1.0, 1.0, 1.0), wp.vec3()
+            inside, normal, shear = float(0.0), wp.vec3(1.0, 1.0, 1.0), wp.vec3()
             if flows:
-                # A surface must not be drawn together: what lies within matter is denser than its face, and has others
-                # all round.
-                within = wp.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
-                inside = data.enclosure[i] * within
-                short = inside * (1.0 - SLACK - dense)
-                # Tension of bulk modulus K: it moves by dt^2 K lack grad W / rho in a substep, however short.
-                wave = data.dt[world] / num.spacing
-                compliance = num.iterations * data.mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
+                inside = within(num, dense) * data.enclosure[i]
+                compliance = num.iterations * drawing_compliance(num, phase, data.mass[i] / own[3], data.dt[world])
                 multiplier += DRAWN * inside * wp.max(data.lack[i], 0.0) / (metric + compliance)
                 normal = wp.vec3(data.fabric_normal[i])
                 shear = wp.vec3(data.fabric_shear[i])
             n, s = multiplier * normal, multiplier * shear
             store_vec4(data.pushes, first + 2, wp.vec4(n[0], n[1], n[2], s[0]))
-            store_vec4(data.pushes, first + 3, wp.vec4(s[1], s[2], short, inside))
+            store_vec4(data.pushes, first + 3, wp.vec4(s[1], s[2], inside * (1.0 - SLACK - dense), inside))
         else:
             store_vec4(data.pushes, first + 2, wp.vec4(multiplier, 0.0, 0.0, 0.0))
 
@@ -133,7 +140,7 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
     pairs of those that are apart, and take the noise of a density for a tension: a few tenths of a percent times the
     bulk modulus are more than a paste's yield stress.
     """
-    row, sums_of = pushing(drawn), 5 if drawn else 3
+    row, sums_of = push_row(drawn), 5 if drawn else 3
     Own, Other, Sums = floats(row + 4), floats(row), floats(sums_of)
 
     @wp.func
@@ -173,11 +180,14 @@ def correct_pass(drawn: bool, tooled: bool) -> Pass:
         moved = wp.vec3(sums[0], sums[1], sums[2])
         if wp.static(tooled):
             found = felt(data.tool, wp.vec3(own[0], own[1], own[2]))
-            along = 2.0 * num.slope_weight * found.first
+            pushed = 2.0 * num.slope_weight * found.first
             if wp.static(drawn):
-                moved += pushed_to(own, along)
+                pushed = pushed_to(own, pushed)
+                if data.tool.slips == 1:
+                    pushed = wp.dot(pushed, found.normal) * found.normal
             else:
-                moved += own[8] * along
+                pushed = own[8] * pushed
+            moved += pushed
         if wp.static(drawn):
             own_level = own[3] * flat(0.0, num.support)
             data.lack[i] = (sums[4] + own_level * own[14]) / wp.max(sums[3] + own_level * own[15], SCARCE)

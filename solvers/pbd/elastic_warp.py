@@ -228,9 +228,9 @@ the sharp one, and the mean of a neighbourhood is brought to that of the flat on
 
 What constraints push along lines to partners presses as the moment M of these does, the fabric: matter that is squeezed
 has more of them along that axis, and so carries a share of its pressure by itself, as friction would: a column of paste
-slumped as if it were an eighth to a third stronger, at any spacing. Pushed along tr(M) / 3 M^-1 of those lines it is
-pressed alike on all sides, as by a pressure in corrected gradients, and no harder; where pushes along M alone have no
-torque, neither have these, for the two commute."""
+slumped as if it were up to a third stronger, at any spacing. Pushed along tr(M) / 3 M^-1 of those lines it is pressed
+alike on all sides, as by a pressure in corrected gradients, and on the mean over the axes no harder. The two commute:
+between partners of one density there is no torque."""
 
 
 @wp.func

@@ -40,14 +40,14 @@ class Numbers:
 PLACE, PUSH, DRAWING, MOVING, PULLING = 4, 12, 16, 8, 16
 
 
-def pushing(drawn: bool) -> int:
-    """Floats in a row of the constraints, where matter is drawn together or is not."""
+def push_row(drawn: bool) -> int:
+    """Floats in a particle's row of the constraints, where matter is drawn together or is not."""
     return DRAWING if drawn else PUSH
 
 
 def numbers_of(config: ConfigPBD, spacing: float, material: Material) -> Numbers:
-    """At a spacing [m]. In what expands pushes are left as they are: to partners of other densities they are shared out
-    by mass, and along the inverse of the fabric that has a torque; and births leave no fabric that lasts."""
+    """At a spacing [m]. In what expands the fabric is left out: pushes are shared out by mass to partners of other
+    densities, and along its inverse that has a torque; and births leave no fabric that lasts."""
     num, ratio = Numbers(), config.support_ratio
     num.support, num.spacing = ratio * spacing, spacing
     num.weight = 1.0 / lattice_sum(cusp, ratio)

@@ -30,7 +30,7 @@ from .bounds import bounds_of
 from .config import ConfigPBD
 from .constraints_warp import Constraining
 from .elasticity import Elasticity
-from .numbers import MOVING, PLACE, PULLING, numbers_of, pushing
+from .numbers import MOVING, PLACE, PULLING, numbers_of, push_row
 
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
@@ -120,7 +120,7 @@ class SolverPBD(Solver):
             self.spans = wp.zeros_like(scene.dt)
             self.fill = wp.ones(pool.size, dtype=float)
             self.places = wp.zeros(pool.size * PLACE // 4, dtype=wp.vec4)
-            self.pushes = wp.zeros(pool.size * pushing(scene.elastic) // 4, dtype=wp.vec4)
+            self.pushes = wp.zeros(pool.size * push_row(scene.elastic) // 4, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, config.skin * scene.spacing)
         self.constraining = Constraining()
         self.constraining.dt, self.constraining.phases = scene.dt, scene.phases
@@ -336,7 +336,7 @@ class SolverPBD(Solver):
 
     def traffic(self) -> dict[str, float]:
         """Implicit viscosity left out."""
-        rows = [PLACE, pushing(self.scene.elastic)] * self.config.iterations + [MOVING, PULLING] * self.scene.elastic
+        rows = [PLACE, push_row(self.scene.elastic)] * self.config.iterations + [MOVING, PULLING] * self.scene.elastic
         return self.neighbours.traffic(rows)
 
     def footprint(self) -> dict[str, int]:
