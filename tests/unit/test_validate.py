@@ -37,10 +37,10 @@ def trial(case, method, error, spacing=None):
 
 
 def test_verdicts():
-    case, spread = cases()["slump_slip"], cases()["spread_deposit"]
+    case, sag = cases()["slump_slip"], cases()["cantilever_sag"]
     assert trial(case, "mpm", 0.01).verdict == PASS
     assert trial(case, "mpm", 0.9).verdict == MISS and trial(case, "mpm", 0.9).note == "no cause known"
-    assert trial(spread, "pbd", 0.9).verdict == EXEMPT and trial(spread, "pbd", 0.01).verdict == PASS
+    assert trial(sag, "pbd", 0.9).verdict == EXEMPT and trial(sag, "pbd", 0.01).verdict == PASS
     assert trial(case, "mpm", math.nan).verdict == MISS
 
 
