@@ -70,7 +70,7 @@ class SolverPBD(Solver):
         "pull",
     )
 
-    typical_rate, typical_bytes = 1.5e5, 900.0
+    typical_rate, typical_bytes = 1.5e5, 1300.0
     bounded = False
 
     @classmethod
