@@ -8,6 +8,7 @@ from ..scenario import Scenario
 from .deposit import Deposit, Section, cut
 
 MIDDLE = (0.2, 0.8)  # share of the path over which a bead's averages are taken
+BEGUN = 3.0  # nozzle diameters of path that a strand may be drawn along as it is begun: thin there, heavy before it
 STRAIGHT = 0.9  # cosine of the turn from which a corner is one: 26 degrees
 BESIDE = 1.0  # nozzle diameters from a corner within which no section is taken
 
@@ -20,19 +21,21 @@ class Bead:
     width: np.ndarray  # [m]
     height: np.ndarray  # [m]
     area: np.ndarray  # [m^2]
+    matter: np.ndarray  # its volume per length [m^2]
     middle: Section
     laid: float = 1.0  # share of the path that the nozzle has come
+    begun: float = 0.0  # length of path that its begin disturbs [m]
 
     @property
     def _inner(self) -> np.ndarray:
-        return in_middle(self.station / (self.laid * self.station[-1]))
+        return in_middle(self.station, self.laid * self.station[-1], self.begun)
 
     def _mean(self, values: np.ndarray) -> float:
         return float(values[self._inner].mean())
 
     def summary(self, layers: int) -> dict[str, float]:
-        """Averages over the middle 60 % of what was laid of the path, per layer where that is meant; nothing where that
-        is too short to have a middle."""
+        """Averages over the middle of what was laid of the path, per layer where that is meant; nothing where that is
+        too short to have a middle."""
         if not self._inner.any():
             return {}
         inner = self.area[self._inner]
@@ -40,6 +43,7 @@ class Bead:
             "bead_width_m": self._mean(self.width),
             "bead_height_m": self._mean(self.height),
             "bead_area_m2": self._mean(self.area) / layers,
+            "bead_matter_m2": self._mean(self.matter) / layers,
             "bead_continuity": float((inner > 0.5 * max(np.median(inner), 1e-30)).mean()),
         }
 
@@ -63,8 +67,9 @@ def measure_bead(deposit: Deposit, scenario: Scenario, laid: float = 1.0) -> Bea
         cut(deposit, p, legs[i], reach, height, scenario.domain.lower[2])
         for p, i in zip(points, leg_at(scenario, station), strict=True)
     ]
-    columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area"))
-    return Bead(station, *columns, middle=sections[int(laid * (len(station) // 2))], laid=laid)
+    columns = (np.array([getattr(s, key) for s in sections]) for key in ("width", "height", "area", "matter"))
+    middle = sections[int(laid * (len(station) // 2))]
+    return Bead(station, *columns, middle=middle, laid=laid, begun=BEGUN * nozzle.diameter)
 
 
 def stations(scenario: Scenario) -> np.ndarray:
@@ -91,13 +96,15 @@ def planned_area(scenario: Scenario) -> float:
     """Q / V [m^2], averaged over the stations of which a bead's averages are taken, once all of it was laid."""
     assert scenario.track is not None and scenario.nozzle is not None
     station = stations(scenario)
-    inner = station[in_middle(station / station[-1])]
+    inner = station[in_middle(station, station[-1], BEGUN * scenario.nozzle.diameter)]
     return scenario.nozzle.rate * float(scenario.track.stroke.fed[leg_at(scenario, inner)].mean())
 
 
-def in_middle(share: np.ndarray) -> np.ndarray:
-    """Whether averages are taken there, at a share of the path."""
-    return (share >= MIDDLE[0]) & (share <= MIDDLE[1])
+def in_middle(station: np.ndarray, laid: float, begun: float) -> np.ndarray:
+    """Whether averages are taken there, at distances along the path of which a length was laid [m]: in its middle 60 %,
+    and beyond what its begin disturbs unless that is more than half of it."""
+    low, high = (share * laid for share in MIDDLE)
+    return (station >= (max(low, begun) if begun <= 0.5 * laid else low)) & (station <= high)
 
 
 def laid_share(birth_time: np.ndarray, scenario: Scenario) -> float:

@@ -47,11 +47,11 @@ class Deposit:
     def _spline(self) -> np.ndarray:
         from scipy.ndimage import spline_filter
 
-        return spline_filter(self.fill, order=3, mode="nearest")
+        return spline_filter(self.fill, order=3, mode="reflect")
 
     def plane(self, points: np.ndarray, up: np.ndarray) -> np.ndarray:
-        """Fill (n, m) by a cubic spline through the cells, the outermost of which extend outwards: at n places (x, y)
-        [m], each the mean of k points (n, k, 2), and at m heights `up` (m,) [m]."""
+        """Fill (n, m) by a cubic spline through the cells, mirrored in the field's faces, at n places (x, y) [m], each
+        the mean of k points (n, k, 2), and at m heights `up` (m,) [m]; nothing beyond them."""
         from scipy.sparse import csr_array
 
         n, k, _ = points.shape
@@ -116,12 +116,15 @@ def _spread(place: np.ndarray, volume: np.ndarray, start: np.ndarray, shape: tup
 
 
 def _taps(place: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray]:
-    """The four cells whose cubic B-splines reach a place [cells], and their weights: two arrays with one axis more."""
+    """The four cells whose cubic B-splines reach a place [cells], and their weights, 0 beyond the faces: two arrays
+    with one axis more."""
     first = np.floor(place)
     t = place - first
     weight = np.stack([(1 - t) ** 3, 4 - 6 * t**2 + 3 * t**3, 1 + 3 * (t + t**2 - t**3), t**3], axis=-1) / 6
     cell = first.astype(int)[..., None] + np.arange(-1, 3)
-    return np.clip(cell, 0, cells - 1), weight
+    cell %= 2 * cells
+    weight[(place < -0.5) | (place > cells - 0.5)] = 0.0
+    return np.minimum(cell, 2 * cells - 1 - cell), weight
 
 
 def _folded(fill: np.ndarray, start: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -163,9 +166,26 @@ class Section:
         return parts[1:-1, 1:-1] != parts[0, 0]
 
     @property
+    def _cell(self) -> float:
+        """Area of a cell of the fine grid [m^2]."""
+        return float((self.across[1] - self.across[0]) * (self.up[1] - self.up[0]))
+
+    @property
     def area(self) -> float:
-        """Area of the cut [m^2]."""
-        return float(self.solid.sum() * (self.across[1] - self.across[0]) * (self.up[1] - self.up[0]))
+        """Area within the outer contour [m^2], and what the field's blur cuts off its rounding: spacing^2 / (8 R) along
+        an outline adds up to spacing^2 / 8 times the angle that it turns through, whatever its shape: 2 pi, or pi if it
+        stands on the floor, which mirrors it."""
+        from scipy.ndimage import label
+
+        parts, count = label(self.solid)
+        standing = len(np.unique(parts[:, 0][self.solid[:, 0]]))
+        turn = np.pi * (2 * count - standing)
+        return self._cell * (float(self.solid.sum()) + turn * FINE**2 / 8)
+
+    @property
+    def matter(self) -> float:
+        """Volume of matter per length [m^2], wherever in the cut it lies: what `area` is of evenly packed matter."""
+        return self._cell * float(self.fill.sum())
 
     @property
     def width(self) -> float:

@@ -52,7 +52,8 @@ def answers(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -
     if scenario.nozzle is not None:
         made.append(lambda: _mass(scenario, series, final))
         if "bead_area_m2" in final:
-            made.append(lambda: _area(scenario, series, final))
+            made.append(lambda: _area(final))
+            made.append(lambda: _matter(scenario, series, final))
     if scenario.reference == "viscoplastic_slump":
         made.append(lambda: _slump(scenario, final))
     if scenario.reference == "martin_moyce_front":
@@ -78,20 +79,27 @@ def _mass(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> 
     return Answer("emitted mass [kg]", final["mass_kg"], expected, off, "in discs of one spacing", source)
 
 
-def _area(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> Answer:
-    """The bead's section Q / V, times what it has expanded, once the whole path was travelled."""
+def _area(final: dict[str, float]) -> Answer:
+    """The bead's section, against the volume of matter that lies there: how well it is packed. Not against Q / V: a
+    strand that is drawn along as it is begun is heavier further on."""
+    got, matter = final["bead_area_m2"], final["bead_matter_m2"]
+    return Answer("bead area [m^2]", got, matter, abs(got / matter - 1.0), "relative", "its matter", "bead_area_m2")
+
+
+def _matter(scenario: Scenario, series: pd.DataFrame, final: dict[str, float]) -> Answer:
+    """The volume per length of what was laid, Q / V, times what it has expanded, once the whole path was travelled."""
     nozzle, path, track = scenario.nozzle, scenario.toolpath, scenario.track
     assert nozzle is not None and path is not None and track is not None
     t = float(series["time_s"].iloc[-1])
     if t < track.end * (1.0 - 1e-6):
-        raise DoesNotApply(f"bead area against Q / V: the path takes {track.end:.3g} s, the run ends at {t:.3g} s")
+        raise DoesNotApply(f"bead matter against Q / V: the path takes {track.end:.3g} s, the run ends at {t:.3g} s")
     area, source = planned_area(scenario), "Q / V"
     if (expansion := scenario.material.expansion) is not None:
         laid = float(track.extruding[-1]) * (np.arange(200) + 0.5) / 200
         area *= float(np.mean([expansion.volume_ratio(t - release) for release in track.release_time(laid)]))
         source = "R Q / V"
-    got = final["bead_area_m2"]
-    return Answer("bead area [m^2]", got, area, abs(got / area - 1.0), "relative", source, "bead_area_m2")
+    got = final["bead_matter_m2"]
+    return Answer("bead matter [m^2]", got, area, abs(got / area - 1.0), "relative", source, "bead_matter_m2")
 
 
 def _slump(scenario: Scenario, final: dict[str, float]) -> Answer:

@@ -146,13 +146,18 @@ def grid_deposit(function, n=48, spacing=0.1):
     return Deposit(origin, spacing, function(places))
 
 
-def test_planes_are_exact_for_polynomials_and_extend_outwards():
+def test_planes_are_exact_for_polynomials_and_empty_beyond_the_faces():
     deposit = grid_deposit(lambda p: 1 + 2 * p[..., 0] - 3 * p[..., 1] + 0.5 * p[..., 2] ** 2)
     points, up = np.array([[[2.43, 0.37]], [[2.2, 0.11]]]), np.array([3.31, 3.47, 3.6])
     expected = 1 + 2 * points[..., 0] - 3 * points[..., 1] + 0.5 * up**2
     assert deposit.plane(points, up) == pytest.approx(expected, rel=1e-9)
     full = grid_deposit(lambda p: np.ones(p.shape[:-1]))
-    assert full.plane(np.array([[[-5.0, 9.0]]]), np.array([0.0])) == pytest.approx(1.0, abs=1e-9)
+    for inside in (0.001, 4.799):
+        assert full.plane(np.array([[[inside, -2.0 + inside]]]), np.array([1.0 + inside])) == pytest.approx(
+            1.0, abs=1e-9
+        )
+    for beyond in ((-0.001, 0.0, 2.0), (1.0, 2.801, 2.0), (1.0, 0.0, 0.999), (1.0, 0.0, 9.0)):
+        assert full.plane(np.array([[beyond[:2]]]), np.array(beyond[2:])).tolist() == [[0.0]]
 
 
 def test_what_is_no_number_fills_nothing_and_a_field_without_cells_is_empty():
@@ -164,15 +169,15 @@ def test_what_is_no_number_fills_nothing_and_a_field_without_cells_is_empty():
 
 
 def test_planes_are_what_scipy_makes_of_the_same_cells():
-    """At places within and beyond the field, averaged over three points each."""
+    """At places up to the faces of the field, which mirror it, averaged over three points each."""
     rng = np.random.default_rng(4)
     deposit = Deposit(np.array([0.1, -0.2, 0.3]), 0.5, rng.random((7, 4, 5)))
-    points, up = rng.uniform(-1.0, 5.0, (11, 3, 2)), rng.uniform(-1.0, 4.0, 6)
+    points, up = rng.uniform((-0.15, -0.45), (3.35, 1.55), (11, 3, 2)), rng.uniform(0.05, 2.55, 6)
     places = np.empty((11, 3, 6, 3))
     places[..., :2], places[..., 2] = points[:, :, None], up
     index = np.moveaxis((places - deposit.origin) / 0.5, -1, 0)
-    coefficients = spline_filter(deposit.fill, order=3, mode="nearest")
-    expected = map_coordinates(coefficients, index, order=3, mode="nearest", prefilter=False).mean(axis=1)
+    coefficients = spline_filter(deposit.fill, order=3, mode="reflect")
+    expected = map_coordinates(coefficients, index, order=3, mode="reflect", prefilter=False).mean(axis=1)
     assert deposit.plane(points, up) == pytest.approx(expected, abs=1e-12)
 
 
@@ -211,7 +216,8 @@ def test_a_section_encloses_its_holes_and_has_its_extents():
         ]
     )
     assert made.solid.sum() == 11 and made.solid[2, 1] and not made.solid[0, 0]
-    assert made.area == pytest.approx(11 * 0.2 * 0.1)
+    assert made.area == pytest.approx((11 + 2 * np.pi) * 0.2 * 0.1)  # its blur takes 16 pi / 8 cells of what stands
+    assert made.matter == pytest.approx(9.39 * 0.2 * 0.1)
     assert made.width == pytest.approx(4 * 0.2) and made.height == pytest.approx(4 * 0.1)
     empty = section(np.full((4, 4), 0.49))
-    assert (empty.area, empty.width, empty.height) == (0.0, 0.0, 0.0)
+    assert (empty.area, empty.width, empty.height) == (0.0, 0.0, 0.0) and empty.matter == pytest.approx(7.84 * 0.02)

@@ -29,27 +29,37 @@ def test_emitted_mass_is_judged_in_discs():
     assert Stream(s).volume * len(Stream(s).offsets) == pytest.approx(disc / 1000.0)
 
 
-def test_the_beads_section_is_what_is_fed_over_how_fast_it_is_laid():
+def laid(area, matter):
+    return {"mass_kg": 0.0, "bead_area_m2": area, "bead_matter_m2": matter}
+
+
+def test_the_beads_section_is_held_against_the_matter_that_lies_there():
+    s = bead(duration=0.7)
+    found = emission_answers(s, laid(0.93e-4, 1.2e-4), 0.1)["bead area [m^2]"]  # whatever is left of the path
+    assert found.measured == 0.93e-4 and found.reference == 1.2e-4 and found.error == pytest.approx(0.225)
+    assert (found.measure, found.source, found.reads) == ("relative", "its matter", "bead_area_m2")
+
+
+def test_the_matter_that_lies_there_is_what_is_fed_over_how_fast_it_is_laid():
     s = bead(duration=0.7, toolpath={"start": [0, 0], "end": [0.03, 0], "speed": 0.05})
     area = np.pi * 0.006**2 * 0.1 / 0.05
-    found = emission_answers(s, {"mass_kg": 0.0, "bead_area_m2": 1.07 * area}, 0.7)["bead area [m^2]"]
+    found = emission_answers(s, laid(1.0, 1.07 * area), 0.7)["bead matter [m^2]"]
     assert found.reference == pytest.approx(area) and found.error == pytest.approx(0.07)
     assert found.measured == 1.07 * area and found.measure == "relative" and found.source == "Q / V"
-    thin = emission_answers(s, {"mass_kg": 0.0, "bead_area_m2": 0.9 * area}, 0.6)["bead area [m^2]"]
-    assert thin.error == pytest.approx(0.1)
-    assert "bead area [m^2]" in emission_answers(s, {"mass_kg": 0.0, "bead_area_m2": area}, 0.6 * (1 - 1e-7))
-    found, reasons = answers(s, pd.DataFrame({"time_s": [0.0, 0.59]}), {"mass_kg": 0.0, "bead_area_m2": area})
-    assert [answer.quantity for answer in found] == ["emitted mass [kg]"]  # the path takes 0.6 s
-    assert reasons == ["bead area against Q / V: the path takes 0.6 s, the run ends at 0.59 s"]
+    assert emission_answers(s, laid(1.0, 0.9 * area), 0.6)["bead matter [m^2]"].error == pytest.approx(0.1)
+    assert "bead matter [m^2]" in emission_answers(s, laid(1.0, area), 0.6 * (1 - 1e-7))
+    found, reasons = answers(s, pd.DataFrame({"time_s": [0.0, 0.59]}), laid(1.0, area))
+    assert [answer.quantity for answer in found] == ["emitted mass [kg]", "bead area [m^2]"]  # the path takes 0.6 s
+    assert reasons == ["bead matter against Q / V: the path takes 0.6 s, the run ends at 0.59 s"]
 
 
-def test_the_section_of_foam_has_grown_by_the_mean_over_its_ages():
+def test_the_matter_of_foam_has_grown_by_the_mean_over_its_ages():
     """R = 1 + 3 (1 - exp(-t / 0.5)) from 0.02 s on, averaged over material 0.1 to 0.4 s old."""
     material = {"density": 100.0, "expansion": {"ratio": 4.0, "time": 0.5, "delay": 0.02}}
     s = bead(material=material, duration=0.4)
     ages = np.linspace(0.1, 0.4, 20001)
     grown = np.mean(4.0 - 3.0 * np.exp(-(ages - 0.02) / 0.5))
-    found = emission_answers(s, {"mass_kg": 0.0, "bead_area_m2": 1.0}, 0.4)["bead area [m^2]"]
+    found = emission_answers(s, laid(1.0, 1.0), 0.4)["bead matter [m^2]"]
     assert found.reference == pytest.approx(np.pi * 0.006**2 * grown, rel=2e-3) and found.source == "R Q / V"
 
 
@@ -68,7 +78,7 @@ def test_pauses_lay_no_foam():
     s = bead(material=material, duration=1.2, toolpath=path)
     ages = np.concatenate([np.linspace(0.9, 1.2, 1001), np.linspace(0.0, 0.3, 1001)])
     grown = np.mean(4.0 - 3.0 * np.exp(-ages / 0.2))
-    found = emission_answers(s, {"mass_kg": 0.0, "bead_area_m2": 1.0}, 1.2)["bead area [m^2]"]
+    found = emission_answers(s, laid(1.0, 1.0), 1.2)["bead matter [m^2]"]
     assert found.reference == pytest.approx(np.pi * 0.006**2 * grown, rel=0.006)
 
 

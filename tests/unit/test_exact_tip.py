@@ -160,10 +160,12 @@ def test_emitted_mass_is_held_against_what_was_fed_and_filled_the_bore():
     s = pressed()
     disc = 1000.0 * s.nozzle.area * 0.002
     series = pd.DataFrame({"time_s": [0.0, 0.5]})
-    (answer, *_), _ = answers(s, series, {"mass_kg": 23 * disc, "bead_area_m2": 1.0})
+    (answer, *_), _ = answers(s, series, {"mass_kg": 23 * disc, "bead_area_m2": 1.0, "bead_matter_m2": 1.0})
     assert answer.reference == pytest.approx(24 * disc) and answer.error == pytest.approx(1.0)
     assert answer.source == "rho Q t, and the bore"
-    (answer, *_), _ = answers(bead(duration=0.5), series, {"mass_kg": 15 * disc, "bead_area_m2": 1.0})
+    (answer, *_), _ = answers(
+        bead(duration=0.5), series, {"mass_kg": 15 * disc, "bead_area_m2": 1.0, "bead_matter_m2": 1.0}
+    )
     assert answer.error == pytest.approx(0.0, abs=1e-9) and answer.source == "rho Q t"
 
 
