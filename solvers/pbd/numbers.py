@@ -24,7 +24,7 @@ class Numbers:
     response: float  # of the density to a move along that slope, over that of its own kernel's [-]
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
-    face: float  # density at the face of a lattice, over that at rest [-]
+    shallow: float  # density one spacing below a face, over that at rest [-]
     face_moment: float  # least eigenvalue there of the spiky kernel's second moment, as bounded [-]
     halfway: float  # between that and what it is within [-]
     iterations: float  # of the density constraints in a substep
@@ -55,7 +55,7 @@ def numbers_of(config: ConfigPBD, spacing: float, material: Material) -> Numbers
     num.slope_weight = 1.0 / lattice_sum(spiky, ratio)
     num.response = response(ratio)
     num.relaxation, num.over_relaxation = config.relaxation, config.over_relaxation
-    num.face, (num.face_moment, within) = face_level(ratio), moments(ratio)
+    num.shallow, (num.face_moment, within) = level_below_face(1.0 / ratio), moments(ratio)
     num.halfway = 0.5 * (num.face_moment + within)
     num.iterations = float(config.iterations)
     num.hourglass = config.zeta(material) * (stiffest(ratio) * spacing) ** 2
@@ -96,10 +96,11 @@ def stiffest(support_ratio: float) -> float:
     return 1.0 / opposed(lattice(support_ratio), np.array(weights))
 
 
-def face_level(support_ratio: float) -> float:
-    """Density summed at the face of a cubic half lattice, over that within it."""
-    half = distances(support_ratio)[lattice(support_ratio)[:, 2] <= 0]
-    return sum(cusp(float(r), support_ratio) for r in half) / lattice_sum(cusp, support_ratio)
+def level_below_face(depth: float) -> float:
+    """Density that is read below the flat face of matter, over that within it, by the integral of `cusp` over what its
+    support reaches of it; depth over the support, 0 to 1."""
+    t = 1.0 - depth
+    return 1.0 - 15.0 * (t**4 / 12.0 - t**5 / 20.0)
 
 
 def moments(support_ratio: float) -> tuple[float, float]:

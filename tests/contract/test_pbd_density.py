@@ -6,7 +6,8 @@ import pytest
 
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
-from solvers.pbd.numbers import DRAWING, face_level, lattice_sum, moments
+from solvers.lattice import lattice
+from solvers.pbd.numbers import DRAWING, distances, lattice_sum, level_below_face, moments
 from solvers.smoothing import cusp, poly6
 
 from ..conftest import scenario
@@ -138,8 +139,23 @@ def test_solids_and_what_expands_are_pushed_along_the_lines_to_partners(material
         assert (normal == 1.0).all() and (shear == 0.0).all()
 
 
-@pytest.mark.parametrize("sum_at_face", [face_level, lambda ratio: moments(ratio)[0] / moments(ratio)[1]])
-def test_a_face_is_half_a_lattice_and_its_own_plane(sum_at_face):
+@pytest.mark.parametrize("layer", [0, 1, 4, 8, 15])
+def test_the_density_below_a_face_is_that_of_a_fine_lattice(layer):
+    ratio = 16.0
+    left = distances(ratio)[lattice(ratio)[:, 2] <= layer]
+    read = sum(cusp(float(r), ratio) for r in left) / lattice_sum(cusp, ratio)
+    assert level_below_face((layer + 0.5) / ratio) == pytest.approx(read, abs=1e-3)
+
+
+@pytest.mark.parametrize("ratio", [2.0, 2.4, 3.5])
+def test_the_first_layer_of_a_lattice_is_too_near_its_face_to_be_drawn_and_the_second_is_not(ratio):
+    layers = [distances(ratio)[lattice(ratio)[:, 2] <= layer] for layer in (0, 1)]
+    first, second = (sum(cusp(float(r), ratio) for r in left) / lattice_sum(cusp, ratio) for left in layers)
+    assert first < level_below_face(1.0 / ratio) < second
+    assert level_below_face(1.0) == 1.0 and level_below_face(0.0) == pytest.approx(0.5)
+
+
+def test_a_face_is_half_a_lattice_and_its_own_plane():
     """In the continuum a half; the plane counts the less the further a kernel reaches: with one over its reach."""
-    beyond = np.array([sum_at_face(ratio) - 0.5 for ratio in (4.0, 8.0, 16.0)])
+    beyond = np.array([moments(ratio)[0] / moments(ratio)[1] - 0.5 for ratio in (4.0, 8.0, 16.0)])
     assert (beyond > 0.0).all() and beyond[:-1] / beyond[1:] == pytest.approx(2.0, rel=0.15)
