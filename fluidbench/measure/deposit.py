@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -177,9 +178,10 @@ class Section:
         stands on the floor, which mirrors it."""
         from scipy.ndimage import label
 
-        parts, count = label(self.solid)
+        parts: Any = np.zeros(self.solid.shape, np.int32)
+        label(self.solid, output=parts)
         standing = len(np.unique(parts[:, 0][self.solid[:, 0]]))
-        turn = np.pi * (2 * count - standing)
+        turn = np.pi * (2 * int(parts.max()) - standing)
         return self._cell * (float(self.solid.sum()) + turn * FINE**2 / 8)
 
     @property

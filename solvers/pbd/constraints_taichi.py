@@ -9,8 +9,8 @@ from ..neighbours_taichi import BoxT, ListsT, image_gradient
 from ..pairs_taichi import over_pairs, reader, symmetric_at, vector_at, vector_into, writer
 from ..taichi_bridge import Floats, Ints, Phases, Quads, Vectors, is_solid, phase_at, ti, vec3, vec4
 from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SCARCE, SLACK, SLACK_SOLID
-from .elastic_taichi import NumbersT, flat, gradient, own_density, sloping, summed
 from .numbers import PLACE, push_row
+from .surroundings_taichi import NumbersT, flat, gradient, own_density, sloping, summed
 
 place_of = reader(PLACE)
 
@@ -63,9 +63,10 @@ def multipliers_of(drawn: bool) -> Callable:
                 sums = constrained_by(num, box, lists, entries, number, places, held, i, own, vec4(0.0))
                 dense = num.weight * (sums[0] + own_density(num, own[3]))
                 phase = phase_at(phases, world, phase_of[i])
-                flows = phase.shear_modulus > 0.0 and not is_solid(phase)
-                if flows:
-                    dense /= 1.0 + bias[i]
+                flows = not is_solid(phase)
+                if ti.static(drawn):
+                    if flows:
+                        dense /= 1.0 + bias[i]
                 fill[i] = dense
                 slope = vector_at(sums, 1).norm() * num.spacing
                 metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
@@ -83,7 +84,8 @@ def multipliers_of(drawn: bool) -> Callable:
                         compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
                         row[15] = enclosure[i] * within
                         row[14] = row[15] * (1.0 - SLACK - dense)
-                        multiplier += DRAWN * row[15] * ti.max(lack[i], 0.0) / (metric + compliance)
+                        answered = ti.math.clamp(lack[i], 0.0, phase.tension_limit / phase.bulk_modulus)
+                        multiplier += DRAWN * row[15] * answered / (metric + compliance)
                         normal, shear = fabric_normal[i], fabric_shear[i]
                     row = vector_into(vector_into(row, 8, multiplier * normal), 11, multiplier * shear)
                 else:

@@ -1,5 +1,5 @@
 """The constraints of position-based fluids (Macklin & Mueller 2013, ACM TOG 32:104) in Warp: nothing is denser than at
-rest, what has strength is no less dense within, and no two are too near."""
+rest, what carries tension is no less dense within, and no two are too near."""
 
 from typing import Any
 
@@ -13,8 +13,8 @@ from ..corrected import symmetric
 from ..images import image_gradient
 from ..pairs import Pass, floats
 from ..tool import Tool, felt
-from .elastic_warp import counted, flat, gradient, sloping, summed
 from .numbers import PLACE, Numbers, push_row
+from .surroundings_warp import counted, flat, gradient, sloping, summed
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -43,9 +43,9 @@ class Constraining:
     motion: wp.array(dtype=wp.vec3)
     pushes: wp.array(dtype=wp.vec4)
     fill: wp.array(dtype=float)
-    bias: wp.array(dtype=float)  # of the density, by disorder: elastic_warp.py; one zero where nothing is elastic
+    bias: wp.array(dtype=float)  # this and the next three: surroundings_warp.py; one zero each where nothing is drawn
     enclosure: wp.array(dtype=float)
-    fabric_normal: wp.array(dtype=wp.vec3)  # inverse of the fabric: elastic_warp.py
+    fabric_normal: wp.array(dtype=wp.vec3)
     fabric_shear: wp.array(dtype=wp.vec3)
     lack: wp.array(dtype=float)  # of density, mean of the neighbourhood, an iteration ago
     correction: wp.array(dtype=wp.vec3)
@@ -73,14 +73,20 @@ def drawing_compliance(num: Numbers, phase: Phase, density: float, dt: float):
     return density / (phase.bulk_modulus * wave * wave)
 
 
+@wp.func
+def held_together(phase: Phase, lack: float):
+    """Lack of density that the tension which the material carries answers."""
+    return wp.clamp(lack, 0.0, phase.tension_limit / phase.bulk_modulus)
+
+
 def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
-    """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper). What has
-    strength and flows is drawn together, too.
+    """Lagrange multiplier of the density constraint rho / rho0 <= 1 (eqs. 1, 8, 9 and 11 of the paper). What flows
+    and carries tension is drawn together, too.
 
     The paper sums density with poly6 and moves along the slope of the spiky kernel. Poly6 has a flat top, under which
     particles pair; the spiky kernel itself reads matter in disorder 8 % too dense, which then swells. `cusp` is between
-    them: 2 to 5 %, which `bias` takes away (elastic_warp.py). Sums: density, gradient of the own place (3), squares of
-    the others'.
+    them: 2 to 5 %, which `bias` takes away (surroundings_warp.py). Sums: density, gradient of the own place (3),
+    squares of the others'.
     """
 
     @wp.func
@@ -93,9 +99,9 @@ def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
         dense = num.weight * (sums[0] + counted(num, own[3]) * summed(0.0, num.support))
         together = wp.vec3(sums[1], sums[2], sums[3])
         phase = data.phases[world, data.phase_of[i]]
-        flows = phase.shear_modulus > 0.0 and not is_solid(phase)
-        if flows:
-            dense /= 1.0 + data.bias[i]
+        if wp.static(drawn):
+            if not is_solid(phase):
+                dense /= 1.0 + data.bias[i]
         data.fill[i] = dense
         limit = 1.0 + wp.where(is_solid(phase), SLACK_SOLID, SLACK)
         # Lengths are scaled by the spacing to make epsilon a number.
@@ -108,10 +114,10 @@ def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
         store_vec4(data.pushes, first + 1, wp.vec4(moved[0], moved[1], moved[2], heft))
         if wp.static(drawn):
             inside, normal, shear = float(0.0), wp.vec3(1.0, 1.0, 1.0), wp.vec3()
-            if flows:
+            if not is_solid(phase):
                 inside = within(num, dense) * data.enclosure[i]
                 compliance = num.iterations * drawing_compliance(num, phase, data.mass[i] / own[3], data.dt[world])
-                multiplier += DRAWN * inside * wp.max(data.lack[i], 0.0) / (metric + compliance)
+                multiplier += DRAWN * inside * held_together(phase, data.lack[i]) / (metric + compliance)
                 normal = wp.vec3(data.fabric_normal[i])
                 shear = wp.vec3(data.fabric_shear[i])
             n, s = multiplier * normal, multiplier * shear

@@ -3,7 +3,7 @@ anew from the same equations."""
 
 from fluidbench.method.frame import CARRIED, FREE
 
-from ..corrected import SINGULAR, SOUND
+from ..corrected import SOUND
 from ..corrected_taichi import (
     elastic_stress,
     from_before,
@@ -17,7 +17,7 @@ from ..flow_taichi import pressure, strained
 from ..hourglass_taichi import off_linear_after
 from ..neighbours_taichi import BoxT, ListsT, image_traction, image_velocity
 from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, symmetric_at, vector_at, vector_into, writer
-from ..smoothing import cusp, drag_weight, poly6, spiky_slope
+from ..smoothing import drag_weight
 from ..taichi_bridge import (
     Floats,
     Ints,
@@ -28,48 +28,23 @@ from ..taichi_bridge import (
     mat3,
     phase_at,
     rest_density,
-    struct_of,
     taichi_func,
     ti,
     vec3,
     vec4,
 )
-from .numbers import MOVING, PULLING, Numbers
+from .numbers import MOVING, PULLING
+from .surroundings_taichi import NumbersT, density_around, fabric_around, levels, moving_of, sloping
 
-NumbersT = struct_of(Numbers)
-gradient, weight = taichi_func(spiky_slope), taichi_func(drag_weight)
-summed, flat = taichi_func(cusp), taichi_func(poly6)
-moving_of, pulling_of = reader(MOVING), reader(PULLING)
+weight = taichi_func(drag_weight)
+pulling_of = reader(PULLING)
 write_pulling = writer(PULLING)
-
-
-@ti.kernel
-def pack(
-    capacity: int, count: Ints, position: Vectors, volume: Floats, velocity: Vectors, overread: Floats, moving: Quads
-):
-    for i in range(position.shape[0]):
-        if i % capacity < count[i // capacity]:
-            x, v = position[i], velocity[i]
-            moving[2 * i] = vec4(x[0], x[1], x[2], volume[i])
-            moving[2 * i + 1] = vec4(v[0], v[1], v[2], overread[i])
-
-
-@ti.func
-def sloping(num, other, r):
-    """V_j grad W, over the kernel's normalisation."""
-    return other[3] * gradient(r.norm(), num.support) / ti.max(r.norm(), 1.0e-9) * r
 
 
 @ti.func
 def holding(num, other, r):
     """V_j w of hourglass control."""
     return other[3] * weight(r.norm() / num.support, num.support)
-
-
-@ti.func
-def own_density(num, volume):
-    """What a particle adds to its own density: its volume counts by half."""
-    return 0.5 * (volume + num.spacing**3) * summed(0.0, num.support)
 
 
 @ti.func
@@ -92,8 +67,7 @@ def strain_pair(num, own, begun, other, r):
     sums = vector_into(sums, 9, vec3(square[0, 0], square[1, 1], square[2, 2]))
     sums = vector_into(sums, 12, vec3(square[0, 1], square[0, 2], square[1, 2]))
     sums = vector_into(sums, 15, holding(num, other, r) * r)
-    level = flat(r.norm(), num.support)
-    sums = vector_into(sums, 21, other[3] * vec3(summed(r.norm(), num.support), level, level * other[7]))
+    sums = vector_into(sums, 21, levels(num, other, r))
     return vector_into(sums, 18, holding(num, other, r) * u)
 
 
@@ -137,10 +111,12 @@ def strain(
             phase = phase_at(phases, world, phase_of[i])
             own = moving_of(rows, i)
             carried, back = mat3(0.0), vec3(0.0)
+            sums = strained_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
+            moment = symmetric_at(sums, 9)
+            correction = symmetric_inverse(moment)
+            bias[i], enclosure[i], overread[i] = density_around(num, own, moment, vector_at(sums, 21))
+            fabric_normal[i], fabric_shear[i] = fabric_around(num, moment, correction)
             if phase.shear_modulus > 0.0:
-                sums = strained_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
-                moment = symmetric_at(sums, 9)
-                correction = symmetric_inverse(moment)
                 span = spanned(moment, correction)
                 slope = stressed(sums, 0) @ correction
                 along = span @ slope
@@ -159,18 +135,6 @@ def strain(
                         volume_ratio[i] = ratio
                 if is_solid(phase):
                     push = ratio * pressure(1.0 / ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
-                own_level = own[3] * flat(0.0, num.support)
-                level = sums[22] + own_level
-                least = least_eigenvalue(moment)
-                evened = num.evened * ti.math.clamp((least - SINGULAR) / (SOUND - SINGULAR), 0.0, 1.0)
-                fabric = evened * moment.trace() / 3.0 * correction
-                fabric_normal[i] = vec3(fabric[0, 0], fabric[1, 1], fabric[2, 2]) + (1.0 - evened)
-                fabric_shear[i] = vec3(fabric[0, 1], fabric[0, 2], fabric[1, 2])
-                beyond_face = least - num.face_moment
-                enclosure[i] = ti.math.clamp(beyond_face / (num.halfway - num.face_moment), 0.0, 1.0)
-                bias[i] = (sums[23] + own_level * own[7]) / level
-                dense = num.weight * (sums[21] + own_density(num, own[3]))
-                overread[i] = enclosure[i] * (dense / (num.flat_weight * level) - 1.0)
                 packing = ti.max(num.lattice * moment.trace() / 3.0, 1.0)
                 back = share * phase.shear_modulus * num.hourglass / packing**2 * z
                 carried = elastic_stress(share * phase.shear_modulus, b, s, push) - back.outer_product(leaning)
@@ -228,4 +192,4 @@ def pull(
             pulled[i] = sums / rest_density(mass, volume, i)
 
 
-KERNELS = {"pack": pack, "strain": strain, "pull": pull}
+KERNELS = {"strain": strain, "pull": pull}

@@ -22,9 +22,10 @@ from ..taichi_bridge import (
     too_fast,
     vec4,
 )
+from . import elastic_taichi, surroundings_taichi
 from .constraints_taichi import constraints
-from .elastic_taichi import KERNELS, NumbersT
 from .kernels_warp import FARTHEST, HURRIED
+from .surroundings_taichi import NumbersT
 
 
 @ti.func
@@ -165,14 +166,16 @@ def wall_friction(
 
 
 @cache
-def passes(strength: bool) -> SimpleNamespace:
-    """The passes, of what has strength or has none."""
+def passes(strength: bool, drawn: bool) -> SimpleNamespace:
+    """The passes, of what has strength or has none, is drawn together or is not."""
+    around = surroundings_taichi.KERNELS if drawn else {}
     return SimpleNamespace(
         predict=predict,
         apply=apply,
         velocities=velocities,
         follow=follow,
         wall_friction=wall_friction,
-        **constraints(strength),
-        **KERNELS,
+        **constraints(drawn),
+        **around,
+        **(elastic_taichi.KERNELS if strength else {}),
     )

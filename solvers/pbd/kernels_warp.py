@@ -19,8 +19,9 @@ from fluidbench.native.vector_access import store_vec4
 from ..images import WALL_INSET, contained, walled
 from ..tool import Tool, outside
 from .constraints_warp import constraints
-from .elastic_warp import KERNELS, elastic
+from .elastic_warp import elastic
 from .numbers import Numbers
+from .surroundings_warp import pack, surroundings
 from .walls import pushed, wall_friction
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -162,11 +163,14 @@ def keep_out(
 
 
 @functools.cache
-def passes(strength: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
-    """The passes for one kind of device, of what has strength or has none, beside a rigid body or without one."""
-    over_pairs = constraints(strength, tooled) | elastic(tooled)
+def passes(strength: bool, drawn: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
+    """The passes for one kind of device, of what has strength or has none, is drawn together or is not, beside a rigid
+    body or without one."""
+    over_pairs = constraints(drawn, tooled)
+    if drawn:
+        over_pairs |= elastic(tooled) if strength else surroundings(tooled)
     names = {key: "tooled_" * tooled + key for key in over_pairs}
-    names |= {key: "drawing_" * strength + names[key] for key in ("multipliers", "correct")}
+    names |= {key: "drawing_" * drawn + names[key] for key in ("multipliers", "correct")}
     return SimpleNamespace(
         predict=predict,
         apply=apply,
@@ -174,6 +178,6 @@ def passes(strength: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
         follow=follow,
         wall_friction=wall_friction,
         **({"keep_out": keep_out} if tooled else {}),
-        **{kernel.key: kernel for kernel in KERNELS},
+        **({"pack": pack} if drawn else {}),
         **{key: one.compiled(names[key], cpu) for key, one in over_pairs.items()},
     )

@@ -31,6 +31,7 @@ from .config import ConfigPBD
 from .constraints_warp import Constraining
 from .elasticity import Elasticity
 from .numbers import MOVING, PLACE, PULLING, numbers_of, push_row
+from .surroundings import Surroundings, is_drawn
 
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
@@ -66,6 +67,7 @@ class SolverPBD(Solver):
         "wall_friction",
         "follow",
         "pack",
+        "surround",
         "strain",
         "pull",
     )
@@ -109,6 +111,7 @@ class SolverPBD(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
+        self.drawn = is_drawn(scene)
         self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
         self.num = numbers_of(config, scene.spacing, scene.scenario.material)
@@ -120,7 +123,7 @@ class SolverPBD(Solver):
             self.spans = wp.zeros_like(scene.dt)
             self.fill = wp.ones(pool.size, dtype=float)
             self.places = wp.zeros(pool.size * PLACE // 4, dtype=wp.vec4)
-            self.pushes = wp.zeros(pool.size * push_row(scene.elastic) // 4, dtype=wp.vec4)
+            self.pushes = wp.zeros(pool.size * push_row(self.drawn) // 4, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, config.skin * scene.spacing)
         self.constraining = Constraining()
         self.constraining.dt, self.constraining.phases = scene.dt, scene.phases
@@ -129,19 +132,22 @@ class SolverPBD(Solver):
         self.constraining.correction = self.correction
         self.constraining.motion = self.motion
         self.constraining.pushes, self.constraining.fill = self.pushes, self.fill
-        self.elastic = Elasticity(scene, pool) if scene.elastic else None
-        if self.elastic is None:
+        self.around = Surroundings(scene, pool) if self.drawn else None
+        self.elastic = None
+        if self.around is None:
             nothing = wp.zeros(1, dtype=float, device=scene.device)
             self.constraining.bias = self.constraining.enclosure = self.constraining.lack = nothing
             self.constraining.fabric_normal = self.constraining.fabric_shear = self.still[:1]
         else:
-            seen = self.elastic.straining
-            self.constraining.bias, self.constraining.enclosure = seen.bias, seen.enclosure
-            self.constraining.fabric_normal, self.constraining.fabric_shear = seen.fabric_normal, seen.fabric_shear
-            self.constraining.lack = pool.add_field("lack", float)
+            self.around.hand_to(self.constraining)
+            self.constraining.lack = self.around.lack
+            if scene.elastic:
+                self.elastic = Elasticity(scene, pool, self.around)
         self.tool = None if scene.outline is None else tool_of(scene, self.num.support, weights(self.num.support))
         if self.tool is not None:
             self.constraining.tool = self.tool
+            if self.around is not None:
+                self.around.data.tool = self.tool
             if self.elastic is not None:
                 self.elastic.straining.tool = self.tool
         self.order = side_by_side(scene, pool)
@@ -158,8 +164,9 @@ class SolverPBD(Solver):
         if backend == "taichi":
             from . import kernels_taichi
 
-            return kernels_taichi.passes(self.scene.elastic)
-        return kernels.passes(self.scene.elastic, self.scene.outline is not None, self.scene.device.is_cpu)
+            return kernels_taichi.passes(self.scene.elastic, self.drawn)
+        scene = self.scene
+        return kernels.passes(scene.elastic, self.drawn, scene.outline is not None, scene.device.is_cpu)
 
     def refresh(self) -> None:
         self.neighbours.refresh()
@@ -177,10 +184,13 @@ class SolverPBD(Solver):
             self.wall_friction()
         if self.viscosity is not None:
             self.follow()
-        if self.elastic is not None:
+        if self.around is not None:
             self.pack()
-            self.strain()
-            self.pull()
+            if self.elastic is None:
+                self.surround()
+            else:
+                self.strain()
+                self.pull()
 
     def constrain(self, iterations: int) -> None:
         for _ in range(iterations):
@@ -286,14 +296,18 @@ class SolverPBD(Solver):
         self.keep_out()
 
     def pack(self) -> None:
-        assert self.elastic is not None
+        assert self.around is not None
         pool = self.pool
-        inputs = [*self._active(), pool.position, pool.volume, pool.velocity, self.elastic.straining.overread]
-        self._launch(self.kernels.pack, inputs, [self.elastic.moving])
+        inputs = [*self._active(), pool.position, pool.volume, pool.velocity, pool.overread]
+        self._launch(self.kernels.pack, inputs, [self.around.moving])
+
+    def surround(self) -> None:
+        assert self.around is not None
+        self._over_pairs(self.kernels.surround, self.around.moving, self.around.data)
 
     def strain(self) -> None:
-        assert self.elastic is not None
-        self._over_pairs(self.kernels.strain, self.elastic.moving, self.elastic.straining)
+        assert self.elastic is not None and self.around is not None
+        self._over_pairs(self.kernels.strain, self.around.moving, self.elastic.straining)
 
     def pull(self) -> None:
         assert self.elastic is not None
@@ -336,11 +350,12 @@ class SolverPBD(Solver):
 
     def traffic(self) -> dict[str, float]:
         """Implicit viscosity left out."""
-        rows = [PLACE, push_row(self.scene.elastic)] * self.config.iterations + [MOVING, PULLING] * self.scene.elastic
-        return self.neighbours.traffic(rows)
+        rows = [PLACE, push_row(self.drawn)] * self.config.iterations + [MOVING] * self.drawn
+        return self.neighbours.traffic(rows + [PULLING] * self.scene.elastic)
 
     def footprint(self) -> dict[str, int]:
         own = ("motion", "correction", "still", "fill", "places", "pushes")
         bytes_of = {name: getattr(self, name).capacity for name in own} | self.neighbours.footprint()
-        elastic = {} if self.elastic is None else self.elastic.footprint()
-        return bytes_of | elastic | footprint_of(self.viscosity) | table_of(self.tool)
+        for part in (self.around, self.elastic):
+            bytes_of |= {} if part is None else part.footprint()
+        return bytes_of | footprint_of(self.viscosity) | table_of(self.tool)

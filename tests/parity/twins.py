@@ -165,7 +165,8 @@ class Twins:
             yield "refresh", lambda solver: solver.refresh()
         skipped = set()
         if self.method == "pbd":
-            skipped |= set() if solver.elastic is not None else {"pack", "strain", "pull"}
+            skipped |= {"surround"} if solver.elastic is not None else {"strain", "pull"}
+            skipped |= set() if solver.around is not None else {"pack", "surround"}
             skipped |= set() if solver.viscosity is not None else {"drag", "follow"}
         for name in self.warp.solver.passes:
             if name not in skipped:
