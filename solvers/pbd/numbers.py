@@ -24,7 +24,8 @@ class Numbers:
     response: float  # of the density to a move along that slope, over that of its own kernel's [-]
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
-    shallow: float  # density one spacing below a face, over that at rest [-]
+    shallow: float  # density up to which what is read is the surface's, over that at rest [-]
+    sure: float  # density from which it is matter's own [-]
     face_moment: float  # least eigenvalue there of the spiky kernel's second moment, as bounded [-]
     halfway: float  # between that and what it is within [-]
     iterations: float  # of the density constraints in a substep
@@ -55,7 +56,8 @@ def numbers_of(config: ConfigPBD, spacing: float, material: Material) -> Numbers
     num.slope_weight = 1.0 / lattice_sum(spiky, ratio)
     num.response = response(ratio)
     num.relaxation, num.over_relaxation = config.relaxation, config.over_relaxation
-    num.shallow, (num.face_moment, within) = level_below_face(1.0 / ratio), moments(ratio)
+    num.shallow, num.sure = read_below_face(ratio, material)
+    num.face_moment, within = moments(ratio)
     num.halfway = 0.5 * (num.face_moment + within)
     num.iterations = float(config.iterations)
     num.hourglass = config.zeta(material) * (stiffest(ratio) * spacing) ** 2
@@ -94,6 +96,16 @@ def stiffest(support_ratio: float) -> float:
     control at zeta = 1 and stress are together 1.01 times as stiff at most at H = 2.4, 1.8 at 3.5 and 1.4 at 2."""
     weights = [drag_weight(float(r) / support_ratio, support_ratio) for r in distances(support_ratio)]
     return 1.0 / opposed(lattice(support_ratio), np.array(weights))
+
+
+def read_below_face(support_ratio: float, material: Material) -> tuple[float, float]:
+    """(`shallow`, `sure`): the density midway between the first and the second layer of a lattice below a face, and 1.
+    Births scatter densities by as much as a face takes from them, and voids must close all the same: in what expands
+    that of the first layer, and from halfway on."""
+    if material.expansion is None:
+        return level_below_face(1.0 / support_ratio), 1.0
+    first = level_below_face(0.5 / support_ratio)
+    return first, 0.5 * (1.0 + first)
 
 
 def level_below_face(depth: float) -> float:

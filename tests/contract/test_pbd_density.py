@@ -6,8 +6,9 @@ import pytest
 
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
+from fluidbench.scenario.material import Material
 from solvers.lattice import lattice
-from solvers.pbd.numbers import DRAWING, distances, lattice_sum, level_below_face, moments
+from solvers.pbd.numbers import DRAWING, distances, lattice_sum, level_below_face, moments, read_below_face
 from solvers.smoothing import cusp, poly6
 
 from ..conftest import scenario
@@ -37,7 +38,7 @@ def block(device, walls, room, side=SIDE, material=PASTE, **more):
     sim.solver.lists()
     for _ in range(2):
         sim.solver.pack()
-        sim.solver.strain()
+        (sim.solver.surround if sim.solver.elastic is None else sim.solver.strain)()
     sim.solver.multipliers()
     sim.solver.backend.wait()
     count = sum(sim.pool.counts)
@@ -153,6 +154,48 @@ def test_the_first_layer_of_a_lattice_is_too_near_its_face_to_be_drawn_and_the_s
     first, second = (sum(cusp(float(r), ratio) for r in left) / lattice_sum(cusp, ratio) for left in layers)
     assert first < level_below_face(1.0 / ratio) < second
     assert level_below_face(1.0) == 1.0 and level_below_face(0.0) == pytest.approx(0.5)
+    assert read_below_face(ratio, Material(**PASTE)) == (level_below_face(1.0 / ratio), 1.0)
+    shallow, sure = read_below_face(ratio, Material(**PASTE, expansion={"ratio": 2.0, "time": 1.0}))
+    assert shallow == pytest.approx(first, abs=0.04) and first < sure < second
+
+
+LIQUID = {"density": 1000.0, "viscosity": 2.0}
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_viscous_liquid_is_read_as_paste_is(device):
+    """Its own pass and the strain's find the same surroundings; one that carries no tension has neither."""
+    more = {"walls": {"z_lower": "stick"}, "room": 0.06, "jitter": 0.3, "seed": 3}
+    found = []
+    for material in (LIQUID | {"tension_limit": 10.0}, PASTE):
+        sim, seen = block(device, material=material, **more)
+        assert ("pulled" in sim.pool.fields) == (material is PASTE)
+        shear = sim.pool.fields["fabric_shear"].numpy()[: len(seen["fill"])]
+        found.append((*(seen[key] for key in ("position", "bias", "overread", "enclosure", "fill")), shear))
+    for liquid, paste in zip(*found, strict=True):
+        assert liquid == pytest.approx(paste, abs=2e-5 * max(1.0, float(np.abs(paste).max())))
+    sim = Simulation(scenario(material=LIQUID | {"tension_limit": 0.0}), "pbd", Target(device), graphs=False)
+    assert sim.solver.around is None and "enclosure" not in sim.pool.fields
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize(("limit", "answered"), [(1e9, 0.05), (1.0, None), (0.0, 0.0)])
+def test_no_more_tension_is_pulled_with_than_the_material_carries(device, limit, answered):
+    """A stretched cube: its multipliers grow with the lack up to the limit over K."""
+    sim, _ = block(device, {}, 0.06, material=PASTE | {"tension_limit": limit}, jitter=0.0)
+    pool, solver, count = sim.pool, sim.solver, sum(sim.pool.counts)
+    bulk = float(sim.scene.phases.numpy()["bulk_modulus"].max())
+    asked = np.zeros(pool.size, np.float32)
+    inner = np.abs(pool.position.numpy()[:count] - SIDE / 2).max(axis=1) < D
+    found = []
+    for lack in (0.05, answered if answered is not None else limit / bulk):
+        asked[:] = lack
+        pool.fields["lack"].assign(asked)
+        solver.multipliers()
+        solver.backend.wait()
+        found.append(solver.pushes.numpy().reshape(-1, DRAWING)[:count][inner, 8])
+    assert found[0] == pytest.approx(found[1], rel=1e-5, abs=1e-12)
+    assert (found[0] > 0.0).all() == (limit > 0.0)
 
 
 def test_a_face_is_half_a_lattice_and_its_own_plane():
