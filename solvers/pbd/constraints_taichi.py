@@ -79,7 +79,7 @@ def multipliers_of(drawn: bool) -> Callable:
                 if ti.static(drawn):
                     normal, shear = vec3(1.0), vec3(0.0)
                     if flows:
-                        within = ti.math.clamp((dense - num.shallow) / (num.sure - num.shallow), 0.0, 1.0)
+                        within = ti.math.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
                         wave = dt[world] / num.spacing
                         compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
                         row[15] = enclosure[i] * within

@@ -61,9 +61,9 @@ def multiplier_pair(num: Numbers, own: floats(PLACE + 4), other: floats(PLACE), 
 
 @wp.func
 def within(num: Numbers, dense: float):
-    """How far what is so dense lies within matter: near a surface a part of the support is empty, and what that takes
-    from the density is no lack (numbers.py)."""
-    return wp.clamp((dense - num.shallow) / (num.sure - num.shallow), 0.0, 1.0)
+    """How far what is so dense lies within matter, from 0 at the face of a lattice to 1: a surface must not be drawn
+    together."""
+    return wp.clamp(2.0 * (dense - num.face) / (1.0 - num.face), 0.0, 1.0)
 
 
 @wp.func

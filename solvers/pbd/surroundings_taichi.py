@@ -50,10 +50,12 @@ def density_around(num, own, moment, found):
     """(bias, enclosure, over-reading)"""
     own_level = own[3] * flat(0.0, num.support)
     level = found[1] + own_level
-    beyond_face = least_eigenvalue(moment) - num.face_moment
-    enclosure = ti.math.clamp(beyond_face / (num.halfway - num.face_moment), 0.0, 1.0)
+    least = least_eigenvalue(moment)
+    beyond_face = ti.math.clamp((least - num.face_moment) / (num.halfway - num.face_moment), 0.0, 1.0)
+    alike = 27.0 * moment.determinant() / ti.max(moment.trace(), 1.0e-12) ** 3
+    enclosure = beyond_face * ti.math.clamp((alike - num.uneven) / (num.even - num.uneven), 0.0, 1.0)
     dense = num.weight * (found[0] + own_density(num, own[3]))
-    return (found[2] + own_level * own[7]) / level, enclosure, enclosure * (dense / (num.flat_weight * level) - 1.0)
+    return (found[2] + own_level * own[7]) / level, enclosure, beyond_face * (dense / (num.flat_weight * level) - 1.0)
 
 
 @ti.func

@@ -39,8 +39,8 @@ vec9 = floats(9)
 class Surrounding:
     """What is written of a particle."""
 
-    enclosure: wp.array(dtype=float)  # 0 at a free surface, 1 from halfway to within on
-    overread: wp.array(dtype=float)  # share by which disorder makes the density read too high, times enclosure
+    enclosure: wp.array(dtype=float)  # 0 at a free surface, 1 where others lie all round alike
+    overread: wp.array(dtype=float)  # share by which disorder makes the density read too high; 0 at a free surface
     bias: wp.array(dtype=float)  # mean of that over the neighbours
     fabric_normal: wp.array(dtype=wp.vec3)  # tr(M) / 3 M^-1 of the moment M; 1 where neighbours are all round alike
     fabric_shear: wp.array(dtype=wp.vec3)
@@ -100,6 +100,16 @@ def levels(num: Numbers, volume: float, overread: float, distance: float):
 
 
 @wp.func
+def evenly(num: Numbers, moment: wp.mat33):
+    """How far others lie all round alike [-], by the eigenvalues of the moment: near a surface a part of the support is
+    empty, and what that takes from the density is no lack, for which a shell would be drawn together. Matter that is
+    stretched evenly reads as it did."""
+    trace = wp.max(wp.trace(moment), 1.0e-12)
+    alike = 27.0 * wp.determinant(moment) / (trace * trace * trace)
+    return wp.clamp((alike - num.uneven) / (num.even - num.uneven), 0.0, 1.0)
+
+
+@wp.func
 def surrounded(num: Numbers, volume: float, overread: float, moment: wp.mat33, correction: wp.mat33, found: wp.vec3):
     """A particle's surroundings, by the moment of its lines, the inverse of that, and its sums of `levels`."""
     own_level = volume * flat(0.0, num.support)
@@ -110,8 +120,9 @@ def surrounded(num: Numbers, volume: float, overread: float, moment: wp.mat33, c
     scale, plain = evened * wp.trace(moment) / 3.0, 1.0 - evened
     around = Around()
     around.bias = (found[2] + own_level * overread) / level
-    around.enclosure = wp.clamp((least - num.face_moment) / (num.halfway - num.face_moment), 0.0, 1.0)
-    around.overread = around.enclosure * (dense / (num.flat_weight * level) - 1.0)
+    beyond_face = wp.clamp((least - num.face_moment) / (num.halfway - num.face_moment), 0.0, 1.0)
+    around.enclosure = beyond_face * evenly(num, moment)
+    around.overread = beyond_face * (dense / (num.flat_weight * level) - 1.0)
     around.fabric_normal = wp.vec3(plain, plain, plain) + scale * wp.get_diag(correction)
     around.fabric_shear = scale * wp.vec3(correction[0, 1], correction[0, 2], correction[1, 2])
     return around
