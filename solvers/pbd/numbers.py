@@ -41,7 +41,7 @@ class Numbers:
 # over-read by. Of stress: position, volume | stress (9), the traction that pulls back (3).
 PLACE, PUSH, DRAWING, MOVING, PULLING = 4, 12, 16, 8, 16
 
-# Of beads of paste at rest: 0.98 +- 0.01 within, 0.90 +- 0.04 from half a spacing to one below the surface.
+# Of paste that was laid and rests: 0.98 +- 0.01 within, 0.90 +- 0.04 from half a spacing to one below the surface.
 EVENNESS, ANY = (0.95, 0.98), (-1.0, 0.0)
 
 

@@ -18,7 +18,7 @@ GRID = ("raw", "moving")
 BY_CHANCE = ("table", "block_of")  # in the order in which threads come, on a GPU
 GARBAGE = 1.0e6  # in slots that nobody may touch
 OWN_LISTS = ("neighbours.entries", "neighbours.number", "neighbours.inside")  # each language goes through its own
-PARTS = (("neighbours.", "neighbours"), ("", "elastic"))  # of a solver that hold arrays
+PARTS = (("neighbours.", "neighbours"), ("", "around"), ("", "elastic"))  # of a solver that hold arrays
 # Rows that neighbours are asked for: which of their floats are one quantity, and judged by its size.
 PLACE, VELOCITY = [(0, 3), (3, 4)], (4, 7)
 ROWS = {
