@@ -12,6 +12,8 @@ from fluidbench.native.scene import PERIODIC
 from fluidbench.native.simulation import Simulation
 from fluidbench.scenario import Scenario
 from solvers.images import INDEX_BITS, INDEX_MASK
+from solvers.pbd.numbers import distances
+from solvers.smoothing import drag_weight
 
 TOLERANCE = 2e-5  # float32; sums may be taken in another order
 GRID = ("raw", "moving")
@@ -85,8 +87,8 @@ class Twins:
 
     def _least_scales(self) -> dict[str, float]:
         """Of what is made of numbers that cancel: SPH's shifts of crowding of order 1 / h, PBD's multipliers of
-        densities of order 1 and what disorder adds to them, its stress of elastic tensors of order 1, MPM's momenta of
-        pushes on one of 27 nodes."""
+        densities of order 1 and what disorder adds to them, its stress of elastic tensors of order 1, what pulls back
+        of motion against each other by the linear part of it, MPM's momenta of pushes on one of 27 nodes."""
         sim = self.warp
         if self.method == "sph":
             speed, dt = float(np.abs(sim.pool.velocity.numpy()).max()), float(sim.scene.dt.numpy()[0])
@@ -99,7 +101,16 @@ class Twins:
         stiffness = float(sim.scene.phases.numpy()["shear_modulus"].max())
         pushes = [f"pushes[{first}:{last}]" for first, last in ((8, 9), (8, 14), (14, 15), (15, 16))]
         fields = [f"pool.{name}" for name in ("overread", "bias", "lack", "fabric_shear")]
-        return dict.fromkeys(pushes + fields, 1.0) | {"pulling[4:13]": max(stiffness, 1e-30)}
+        num, speed = sim.solver.num, float(np.abs(sim.pool.velocity.numpy()).max())
+        weights = sum(
+            drag_weight(float(r) * num.spacing / num.support, num.support) for r in distances(num.support / num.spacing)
+        )
+        against = 2.0 * speed * float(sim.scene.dt.numpy()[0]) * weights * num.spacing**3
+        held = {
+            "pulling[4:13]": max(stiffness, 1e-30),
+            "pulling[13:16]": max(stiffness * num.hourglass * against, 1e-30),
+        }
+        return dict.fromkeys(pushes + fields, 1.0) | held
 
     def equalise(self) -> None:
         """Give Taichi's twin the state of Warp's."""
