@@ -83,6 +83,8 @@ def _area(final: dict[str, float]) -> Answer:
     """The bead's section, against the volume of matter that lies there: how well it is packed. Not against Q / V: a
     strand that is drawn along as it is begun is heavier further on."""
     got, matter = final["bead_area_m2"], final["bead_matter_m2"]
+    if not matter > 0.0:
+        raise DoesNotApply("bead area against its matter: none lies along the path")
     return Answer("bead area [m^2]", got, matter, abs(got / matter - 1.0), "relative", "its matter", "bead_area_m2")
 
 

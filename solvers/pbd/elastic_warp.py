@@ -37,7 +37,7 @@ from ..pairs import Pass, floats
 from ..smoothing import drag_weight
 from ..tool import Tool, felt, seen_by_tool
 from .numbers import MOVING, PULLING, Numbers
-from .surroundings_warp import levels, sloping, surrounded
+from .surroundings_warp import keep, levels, sloping, surrounded
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -109,11 +109,7 @@ def strain_finish(num: Numbers, box: Box, data: Straining, world: int, i: int, o
     moment = symmetric(wp.vec3(sums[9], sums[10], sums[11]), wp.vec3(sums[12], sums[13], sums[14]))
     correction = symmetric_inverse(moment)
     around = surrounded(num, own[3], own[7], moment, correction, wp.vec3(sums[21], sums[22], sums[23]))
-    data.enclosure[i] = around.enclosure
-    data.overread[i] = around.overread
-    data.bias[i] = around.bias
-    data.fabric_normal[i] = around.fabric_normal
-    data.fabric_shear[i] = around.fabric_shear
+    keep(data, i, around)
     if phase.shear_modulus > 0.0:
         slope = wp.mat33(
             sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]

@@ -101,7 +101,7 @@ class SolverPBD(Solver):
         m, words = scenario.material, []
         if m.youngs_modulus is not None:
             words.append("elastic waves are damped: backward Euler takes w dt / 2 of one of frequency w in a radian")
-        if m.youngs_modulus is not None and not m.is_solid:
+        if (m.youngs_modulus is not None or m.viscosity > 0.0) and not m.is_solid:
             words.append("isotropic tension is a density constraint's: it draws together what lies within matter")
         return [*words, "pressure is whatever keeps rho <= rho0: no equation of state, no sound speed"]
 

@@ -14,6 +14,7 @@ between partners of one density there is no torque.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import warp as wp
 
@@ -129,6 +130,15 @@ def surrounded(num: Numbers, volume: float, overread: float, moment: wp.mat33, c
 
 
 @wp.func
+def keep(data: Any, i: int, around: Around):
+    data.enclosure[i] = around.enclosure
+    data.overread[i] = around.overread
+    data.bias[i] = around.bias
+    data.fabric_normal[i] = around.fabric_normal
+    data.fabric_shear[i] = around.fabric_shear
+
+
+@wp.func
 def surround_pair(num: Numbers, own: floats(MOVING + 4), other: floats(MOVING), r: wp.vec3):
     g = sloping(num, other[3], r)
     level = levels(num, other[3], other[7], wp.length(r))
@@ -143,11 +153,7 @@ def surround_finish(num: Numbers, box: Box, data: Surrounding, world: int, i: in
     moment = symmetric(wp.vec3(sums[0], sums[1], sums[2]), wp.vec3(sums[3], sums[4], sums[5]))
     found = wp.vec3(sums[6], sums[7], sums[8])
     around = surrounded(num, own[3], own[7], moment, symmetric_inverse(moment), found)
-    data.enclosure[i] = around.enclosure
-    data.overread[i] = around.overread
-    data.bias[i] = around.bias
-    data.fabric_normal[i] = around.fabric_normal
-    data.fabric_shear[i] = around.fabric_shear
+    keep(data, i, around)
 
 
 @wp.func

@@ -38,6 +38,9 @@ def test_the_beads_section_is_held_against_the_matter_that_lies_there():
     found = emission_answers(s, laid(0.93e-4, 1.2e-4), 0.1)["bead area [m^2]"]  # whatever is left of the path
     assert found.measured == 0.93e-4 and found.reference == 1.2e-4 and found.error == pytest.approx(0.225)
     assert (found.measure, found.source, found.reads) == ("relative", "its matter", "bead_area_m2")
+    none, reasons = answers(s, pd.DataFrame({"time_s": [0.0, 0.1]}), laid(0.0, 0.0))
+    assert [answer.quantity for answer in none] == ["emitted mass [kg]"]
+    assert "bead area against its matter: none lies along the path" in reasons
 
 
 def test_the_matter_that_lies_there_is_what_is_fed_over_how_fast_it_is_laid():
