@@ -18,6 +18,7 @@ from fluidbench.scenario import Scenario
 from .. import aging
 from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
+from ..flow import is_tensile
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
@@ -31,7 +32,7 @@ from .config import ConfigPBD
 from .constraints_warp import Constraining
 from .elasticity import Elasticity
 from .numbers import MOVING, PLACE, PULLING, numbers_of, push_row
-from .surroundings import Surroundings, is_drawn
+from .surroundings import Surroundings
 
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
@@ -111,7 +112,7 @@ class SolverPBD(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.drawn = is_drawn(scene)
+        self.drawn = is_tensile(scene)
         self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
         self.num = numbers_of(config, scene.spacing, scene.scenario.material)

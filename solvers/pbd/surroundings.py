@@ -10,15 +10,6 @@ from fluidbench.native.scene import Scene
 from .numbers import MOVING
 from .surroundings_warp import Surrounding
 
-TENSE = 1e-4  # lack of density that a tension is worth: what carries less is not drawn together, for nobody would see
-
-
-def is_drawn(scene: Scene) -> bool:
-    """Whether anything carries a tension, now or later: what has strength, and liquids by that of their own viscosity
-    (`tension_limit`)."""
-    phases: Any = scene.phases.numpy()
-    return scene.elastic or bool((phases["tension_limit"] > TENSE * phases["bulk_modulus"]).any())
-
 
 class Surroundings:
     """What the tension of matter adds to a pool, and what its passes take."""

@@ -12,10 +12,12 @@ from .particle import Smoothing, slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-# Rows of `force`: position, mass | velocity, then of liquids the pressure term; of what has strength stress (9), the
-# traction that pulls back (3) and how far it is a straggler. Where partners differ also density, rest density,
-# viscosity, sound.
-STATE = {(False, False): 8, (True, False): 20, (False, True): 12, (True, True): 24}
+
+def width_of(strength: bool, tensile: bool, changing: bool) -> int:
+    """Floats of a row of `force`: position, mass | velocity, then the pressure term; of what carries tension instead of
+    that its stress (9), of what has strength also the traction that pulls back (3) and how far it is a straggler. Where
+    partners differ also density, rest density, viscosity, sound."""
+    return (20 if strength else 16 if tensile else 8) + (4 if changing else 0)
 
 
 @wp.struct
@@ -31,10 +33,10 @@ class Forcing:
     tool: Tool
 
 
-def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> Pass:
+def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, tooled: bool) -> Pass:
     """Momentum: pressure or stress, artificial and Newtonian viscosity. Sums: what pushes (3), and what pushes across
     friction walls (3), which never pull and rub by Coulomb's law."""
-    N = width = STATE[strength, changing]
+    N = width = width_of(strength, tensile, changing)
     LAST = width - 4
     Own, Other, Sums = floats(width + 4), floats(width), floats(6)
 
@@ -53,12 +55,13 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
         v = image_velocity(box, wp.vec3(row[4], row[5], row[6]), code)
         for axis in range(3):
             row[4 + axis] = v[axis]
-        if wp.static(strength):
+        if wp.static(tensile):
             t = wp.mat33(row[7], row[8], row[9], row[10], row[11], row[12], row[13], row[14], row[15])
             t = mirrored_stress(box, t, code)
             for a in range(3):
                 for b in range(3):
                     row[7 + 3 * a + b] = t[a, b]
+        if wp.static(strength):
             g = image_traction(box, wp.vec3(row[16], row[17], row[18]), code)
             for axis in range(3):
                 row[16 + axis] = g[axis]
@@ -85,7 +88,7 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
             drag = 10.0 * num.viscous_lattice * thin / (own[LAST + 1] * other[LAST + 1])
         along = float(0.0)
         push = wp.vec3(0.0, 0.0, 0.0)
-        if wp.static(strength):
+        if wp.static(tensile):
             both = wp.mat33(
                 mine * own[7] + theirs * other[7], mine * own[8] + theirs * other[8], mine * own[9] + theirs * other[9],
                 mine * own[10] + theirs * other[10],
@@ -95,17 +98,19 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
                 mine * own[14] + theirs * other[14],
                 mine * own[15] + theirs * other[15],
             )  # fmt: skip
-            pull = wp.vec3(
+            push = both * r
+        else:
+            along = -(mine * own[7] + theirs * other[7])
+        if wp.static(strength):
+            push += wp.vec3(
                 theirs * other[16] - mine * own[16],
                 theirs * other[17] - mine * own[17],
                 theirs * other[18] - mine * own[18],
             )
-            push = both * r + pull
-            along = wp.max(own[19], other[19]) * shock * ur / (r2 + tiny)
+            along += wp.max(own[19], other[19]) * shock * ur / (r2 + tiny)
         else:
-            both_pressures = mine * own[7] + theirs * other[7]
             # artificial viscosity for approaching particles (Monaghan 1992)
-            along = shock * wp.min(ur, 0.0) / (r2 + tiny) - both_pressures
+            along += shock * wp.min(ur, 0.0) / (r2 + tiny)
         if wp.static(viscous):
             along += drag * ur / (r2 + 0.01 * tiny)
         push = f * (push + along * r)
@@ -127,7 +132,7 @@ def force_pass(strength: bool, viscous: bool, changing: bool, tooled: bool) -> P
             both = 2.0 * rho * found.first
             if wp.static(changing):
                 both *= 1.0 / own[LAST + 1]
-            if wp.static(strength):
+            if wp.static(tensile):
                 a = wp.mat33(own[7], own[8], own[9], own[10], own[11], own[12], own[13], own[14], own[15]) * both
             else:
                 a = -own[7] * both

@@ -55,7 +55,7 @@ from ..taichi_bridge import (
     vec3,
     vec4,
 )
-from .force_warp import STATE
+from .force_warp import width_of
 from .particle import WHOLE, Smoothing
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
@@ -175,11 +175,11 @@ def matter_seen(box, extra: ti.template(), row, j, code):
 
 
 @functools.cache
-def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
-    """All passes, for materials with or without shear stiffness, viscosity, and parameters or rest densities that
-    differ between particles."""
-    width = STATE[strength, changing]
-    last, many = width - 4, 25 if strength else 10
+def passes(strength: bool, tensile: bool, viscous: bool, changing: bool) -> SimpleNamespace:
+    """All passes, for materials with or without shear stiffness, tension, viscosity, and parameters or rest densities
+    that differ between particles."""
+    width = width_of(strength, tensile, changing)
+    last, many = width - 4, 25 if strength else 22 if tensile else 10
     state_at, write_state = reader(width), writer(width)
 
     @ti.func
@@ -195,11 +195,12 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
         near = (kernel(r.norm() / num.h, num.h) / num.near) ** 4
         sums = vector_into(sums, 4, ti.max(near - 1.0, 0.0) * w * r)
         if ti.static(strength):
+            sums = vector_into(sums, 22, w * u)
+        if ti.static(tensile):
             sums = matrix_into(sums, 7, -w * u.outer_product(r))
             square = -w * r.outer_product(r)
             sums = vector_into(sums, 16, vec3(square[0, 0], square[1, 1], square[2, 2]))
             sums = vector_into(sums, 19, vec3(square[0, 1], square[0, 2], square[1, 2]))
-            sums = vector_into(sums, 22, w * u)
         else:
             ur, r2 = u.dot(r), r.norm_sqr()
             sums[7], sums[8], sums[9] = -w * r2, w * ur, -w * ur * ur / (r2 + 0.01 * num.h * num.h)
@@ -245,9 +246,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
                 second, approach, sheared, alone, least, flows, h = 0.0, 0.0, 0.0, 0.0, 0.0, True, dt[world]
-                gradient, correction, span = mat3(0.0), mat3(0.0), mat3(0.0)
+                gradient, deformation, correction, span = mat3(0.0), mat3(0.0), mat3(0.0), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
-                if ti.static(strength):
+                if ti.static(tensile):
                     moment = symmetric_at(sums, 16)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
@@ -256,9 +257,14 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                     deformation = strain_by_chords(span, gradient, h)
                     gradient = span @ gradient
                     approach = -rho * deformation.trace()
+                    sheared = shear_rate(gradient)
+                    least = least_eigenvalue(moment / rho)
+                else:
+                    second, approach = sums[7], sums[8]
+                    sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
+                if ti.static(strength):
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
                     off = (vector_at(sums, 22) - gradient @ first_moment) / rho
-                    least = least_eigenvalue(moment / rho)
                     alone = ti.math.clamp((EDGE - least) / (EDGE - SOUND), 0.0, 1.0)
                     if least < SOUND:
                         off, z = vec3(0.0), vec3(0.0)
@@ -271,10 +277,6 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
                         z = off_linear_after(z, gradient, off, kept, h)
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
-                    sheared = shear_rate(gradient)
-                else:
-                    second, approach = sums[7], sums[8]
-                    sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
                 inflow, crowd = approach, vector_at(sums, 4) / rho
                 if flows and not is_solid(phase):
                     if ti.static(strength and changing):
@@ -298,15 +300,19 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
                 row = ti.Vector.zero(ti.f32, width)
                 for c in ti.static(range(7)):
                     row[c] = own[c]
+                cauchy = mat3(0.0)
+                for c in ti.static(range(3)):
+                    cauchy[c, c] = -p
                 if ti.static(strength):
                     damping = 0.1 * num.artificial_viscosity * num.h * sound * rho
                     packing = ti.max(num.lattice * second / (3.0 * rho), 1.0)
                     pull = num.compact / packing**2 * (num.hourglass * phase.shear_modulus * z + damping * off)
                     cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
                     cauchy -= pull.outer_product(first_moment / own[7])
-                    row = matrix_into(row, 7, scale * (span @ cauchy @ correction))
                     row = vector_into(row, 16, scale * pull)
                     row[19] = alone
+                if ti.static(tensile):
+                    row = matrix_into(row, 7, scale * (span @ cauchy @ correction))
                 else:
                     row[7] = scale * p
                 if ti.static(changing):
@@ -317,8 +323,9 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
     @ti.func
     def state_seen(box, extra: ti.template(), row, j, code):
         out = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
-        if ti.static(strength):
+        if ti.static(tensile):
             out = matrix_into(out, 7, mirrored_stress(box, stressed(row, 7), code))
+        if ti.static(strength):
             out = vector_into(out, 16, image_traction(box, vector_at(row, 16), code))
         return out
 
@@ -338,13 +345,15 @@ def passes(strength: bool, viscous: bool, changing: bool) -> SimpleNamespace:
             drag = 10.0 * num.viscous_lattice * thin / (own[last + 1] * other[last + 1])
         along = 0.0  # what acts along the line of centres
         push = vec3(0.0)
-        if ti.static(strength):
+        if ti.static(tensile):
             push = (mine * stressed(own, 7) + theirs * stressed(other, 7)) @ r
-            push += theirs * vector_at(other, 16) - mine * vector_at(own, 16)
-            along = ti.max(own[19], other[19]) * shock * ur / (r2 + tiny)
         else:
-            pressures = mine * own[7] + theirs * other[7]
-            along = shock * ti.min(ur, 0.0) / (r2 + tiny) - pressures
+            along = -(mine * own[7] + theirs * other[7])
+        if ti.static(strength):
+            push += theirs * vector_at(other, 16) - mine * vector_at(own, 16)
+            along += ti.max(own[19], other[19]) * shock * ur / (r2 + tiny)
+        else:
+            along += shock * ti.min(ur, 0.0) / (r2 + tiny)
         if ti.static(viscous):
             along += drag * ur / (r2 + 0.01 * tiny)
         return vector_into(ti.Vector.zero(ti.f32, 6), 0, other[3] * slope(q, num.h) * (push + along * r))

@@ -1,8 +1,8 @@
 """Weakly compressible SPH in Warp: continuity density, delta-SPH diffusion, the common material law.
 
 One substep: lists, pack (rows that neighbours are asked for), strain (continuity, velocity gradient, stress), force
-(momentum), move. Materials with shear stiffness use corrected gradients for strain and stress (see corrected.py),
-liquids the symmetric form of Monaghan (2005, Rep. Prog. Phys. 68:1703). Sums over pairs are those of pairs.py.
+(momentum), move. Materials that carry tension use corrected gradients for strain and stress (see corrected.py), others
+the symmetric form of Monaghan (2005, Rep. Prog. Phys. 68:1703). Sums over pairs are those of pairs.py.
 """
 
 import functools
@@ -26,13 +26,14 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 
 @functools.cache
-def passes(strength: bool, viscous: bool, changing: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
-    """The passes for materials with or without shear stiffness, viscosity, parameters or rest densities that differ
-    between particles, and a rigid body that is carried along: unused physics costs nothing."""
-    name = f"{'strength' if strength else 'liquid'}_{'viscous' if viscous else 'inviscid'}"
+def passes(strength: bool, tensile: bool, viscous: bool, changing: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
+    """The passes for materials with or without shear stiffness, tension, viscosity, parameters or rest densities that
+    differ between particles, and a rigid body that is carried along: unused physics costs nothing."""
+    name = "strength" if strength else "tensile" if tensile else "liquid"
+    name += "_viscous" if viscous else "_inviscid"
     name += "_changing" * changing + "_tooled" * tooled
-    strain = strain_pass(strength, changing, tooled).compiled(f"strain_{name}", cpu)
-    force = force_pass(strength, viscous, changing, tooled).compiled(f"force_{name}", cpu)
+    strain = strain_pass(strength, tensile, changing, tooled).compiled(f"strain_{name}", cpu)
+    force = force_pass(strength, tensile, viscous, changing, tooled).compiled(f"force_{name}", cpu)
     kept_out = {"keep_out": keep_out} if tooled else {}
     return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **kept_out)
 

@@ -21,7 +21,7 @@ from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..crowding import crowding, nearest
-from ..flow import plastic_strains
+from ..flow import is_tensile, plastic_strains
 from ..lattice import lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
@@ -34,7 +34,7 @@ from ..viscosity import WORTH, ImplicitViscosity, beside, decided
 from . import kernels_warp as kernels
 from .bounds import bounds_of
 from .config import ConfigSPH
-from .force_warp import STATE, Forcing
+from .force_warp import Forcing, width_of
 from .particle import Smoothing
 from .strain_warp import MATTER, Straining
 
@@ -128,6 +128,8 @@ class SolverSPH(Solver):
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
         self.implicit = scene.viscous and config.viscosity == "implicit"
+        self.tensile = is_tensile(scene)
+        self.width = width_of(scene.elastic, self.tensile, scene.changes)
         self.kernels = self.kernels_of(backend)
         self.num = Smoothing()
         ratio = config.smoothing(scene.scenario.material)
@@ -152,7 +154,7 @@ class SolverSPH(Solver):
             self.unused = wp.zeros(1, dtype=wp.vec3)
             self.growth = pool.growth if scene.grows else wp.zeros(pool.size if scene.changes else 1, dtype=float)
             self.matter = wp.zeros(pool.size * MATTER // 4, dtype=wp.vec4)
-            self.state = wp.zeros(pool.size * STATE[scene.elastic, scene.changes] // 4, dtype=wp.vec4)
+            self.state = wp.zeros(pool.size * self.width // 4, dtype=wp.vec4)
             self.new_density = wp.zeros(pool.size, dtype=float)
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
@@ -172,7 +174,7 @@ class SolverSPH(Solver):
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
         scene = self.scene
-        variant = scene.elastic, scene.viscous and not self.implicit, scene.changes
+        variant = scene.elastic, self.tensile, scene.viscous and not self.implicit, scene.changes
         if backend == "taichi":
             from . import kernels_taichi
 
@@ -322,7 +324,7 @@ class SolverSPH(Solver):
         return shear_stress(self.scene, self.pool)
 
     def traffic(self) -> dict[str, float]:
-        return self.neighbours.traffic([MATTER, STATE[self.scene.elastic, self.scene.changes]])
+        return self.neighbours.traffic([MATTER, self.width])
 
     def footprint(self) -> dict[str, int]:
         own = {name: getattr(self, name).capacity for name in self.OWN}

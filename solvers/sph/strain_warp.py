@@ -25,7 +25,7 @@ from ..hourglass import off_linear
 from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
-from .force_warp import STATE
+from .force_warp import width_of
 from .particle import Smoothing, broken, drifted, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -68,17 +68,20 @@ def seen_matter(box: Box, data: Straining, row: floats(MATTER), j: int, code: in
     return row
 
 
-def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
+def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> Pass:
     """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
-    `move`). Sums: diffusion, the first moment (3), crowding (3); then of liquids the second moment, the inflow and the
-    rate of shear squared over 5, of what has strength the velocity gradient (9), the second moment (xx yy zz xy xz yz)
-    and the motion off the mean of the neighbours (3).
+    `move`). Sums: diffusion, the first moment (3), crowding (3); then the second moment, the inflow and the rate of
+    shear squared over 5; of what carries tension instead of these the velocity gradient (9) and the second moment
+    (xx yy zz xy xz yz), of what has strength also the motion off the mean of the neighbours (3).
+
+    A plain sum takes it for expansion when a particle comes to the surface, out of a bore: tension pulled the skin of
+    strands together by a fifth. A liquid that cavitates feels none, and needs no correction.
     """
-    sums_of = 25 if strength else 10
-    state_of = STATE[strength, changing] // 4
-    Own, Other, Sums, Strong = floats(MATTER + 4), floats(MATTER), floats(sums_of), floats(25)
+    sums_of = 25 if strength else 22 if tensile else 10
+    state_of = width_of(strength, tensile, changing) // 4
+    Own, Other, Sums = floats(MATTER + 4), floats(MATTER), floats(sums_of)
 
     @wp.func
     def pair(num: Smoothing, own: Own, other: Other, r: wp.vec3):
@@ -96,19 +99,28 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         spread = w * (own[7] - partner - wp.dot(wp.vec3(own[8], own[9], own[10]) + carried, r))
         m = w * r
         crowd = excess(wp.sqrt(r2), num.h, num.near) * m
-        if wp.static(strength):
-            return Strong(
-                spread, m[0], m[1], m[2], crowd[0], crowd[1], crowd[2],
-                -u[0] * m[0], -u[0] * m[1], -u[0] * m[2],
-                -u[1] * m[0], -u[1] * m[1], -u[1] * m[2],
-                -u[2] * m[0], -u[2] * m[1], -u[2] * m[2],
-                -m[0] * r[0], -m[1] * r[1], -m[2] * r[2], -m[0] * r[1], -m[0] * r[2], -m[1] * r[2],
-                w * u[0], w * u[1], w * u[2],
-            )  # fmt: skip
-        else:  # noqa: RET505 - Warp compiles one of the two
+        sums = Sums()
+        sums[0] = spread
+        for a in range(3):
+            sums[1 + a] = m[a]
+            sums[4 + a] = crowd[a]
+        if wp.static(tensile):
+            for a in range(3):
+                for b in range(3):
+                    sums[7 + 3 * a + b] = -u[a] * m[b]
+                sums[16 + a] = -m[a] * r[a]
+            sums[19] = -m[0] * r[1]
+            sums[20] = -m[0] * r[2]
+            sums[21] = -m[1] * r[2]
+        else:
             ur = wp.dot(u, r)
-            sheared = -w * ur * ur / (r2 + 0.01 * num.h * num.h)
-            return Sums(spread, m[0], m[1], m[2], crowd[0], crowd[1], crowd[2], -w * r2, w * ur, sheared)
+            sums[7] = -w * r2
+            sums[8] = w * ur
+            sums[9] = -w * ur * ur / (r2 + 0.01 * num.h * num.h)
+        if wp.static(strength):
+            for a in range(3):
+                sums[22 + a] = w * u[a]
+        return sums
 
     @wp.func
     def into_tool(tool: Tool, own: Own, sums: Sums):
@@ -119,18 +131,20 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             u = rho * seen_by_tool(tool, found, wp.vec3(own[4], own[5], own[6]))
             for a in range(3):
                 sums[1 + a] += rho * found.first[a]
-            if wp.static(strength):
+            if wp.static(tensile):
                 for a in range(3):
                     for b in range(3):
                         sums[7 + 3 * a + b] -= u[a] * found.own[b]
                     sums[16 + a] -= rho * found.second[a, a]
-                    sums[22 + a] += u[a] * found.zeroth
                 sums[19] -= rho * found.second[0, 1]
                 sums[20] -= rho * found.second[0, 2]
                 sums[21] -= rho * found.second[1, 2]
             else:
                 sums[7] -= rho * wp.trace(found.second)
                 sums[8] += wp.dot(u, found.own)
+            if wp.static(strength):
+                for a in range(3):
+                    sums[22 + a] += u[a] * found.zeroth
         return sums
 
     @wp.func
@@ -148,10 +162,10 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         spread = sums[0]
         first_moment = wp.vec3(sums[1], sums[2], sums[3])
         crowd = wp.vec3(sums[4], sums[5], sums[6])
-        second, inflow, strain, alone = float(0.0), float(0.0), float(0.0), float(0.0)
+        second, inflow, strain, least, alone = float(0.0), float(0.0), float(0.0), float(0.0), float(0.0)
         flows = bool(True)
-        gradient, correction, span = wp.mat33(), wp.mat33(), wp.mat33()
-        if wp.static(strength):
+        gradient, deformation, correction, span = wp.mat33(), wp.mat33(), wp.mat33(), wp.mat33()
+        if wp.static(tensile):
             # density from the corrected gradient, too: the same strain for pressure and for shear
             moment = wp.mat33(
                 sums[16], sums[19], sums[20], sums[19], sums[17], sums[21], sums[20], sums[21], sums[18]
@@ -166,10 +180,16 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             deformation = strain_by_chords(span, gradient, h)
             gradient = span * gradient
             inflow = -rho * wp.trace(deformation)
+            strain = h * shear_rate(gradient)
+            least = least_eigenvalue(moment / rho)
+        else:
+            second = sums[7]
+            inflow = sums[8]
+            strain = h * wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
+        if wp.static(strength):
             b = data.elastic_normal[i]
             s = data.elastic_shear[i]
             # the gradient of a straggler is not exact even in a linear flow
-            least = least_eigenvalue(moment / rho)
             whole = float(least >= SOUND)
             alone = straggling(least)
             if wp.static(changing):
@@ -184,11 +204,6 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
                 data.elastic_normal[i] = b
                 data.elastic_shear[i] = s
                 data.off_linear[i] = z
-            strain = h * shear_rate(gradient)
-        else:
-            second = sums[7]
-            inflow = sums[8]
-            strain = h * wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
         flows = flows and not is_solid(phase)
         if wp.static(strength and changing):
             if grown and flows:
@@ -210,6 +225,7 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
         scale = 1.0 / (rho * rho)
         if wp.static(changing):
             scale *= rest  # over that of the partner: see `force_pass`
+        stress = wp.diag(wp.vec3(-p, -p, -p))
         at = i * state_of
         store_vec4(data.state, at, wp.vec4(own[0], own[1], own[2], own[3]))
         if wp.static(strength):
@@ -222,13 +238,15 @@ def strain_pass(strength: bool, changing: bool, tooled: bool) -> Pass:
             compact = num.compact / (packing * packing)
             damping = 0.1 * num.artificial_viscosity * num.h * sound * rho * compact
             pull = pulled_back(phase, num.hourglass * compact, damping, z, q)
-            # With the correction of its gradient stress does on the particles exactly the work of the strain.
-            t = scale * (span * (elastic_stress(g, b, s, p) - wp.outer(pull, first_moment / own[7])) * correction)
+            stress = elastic_stress(g, b, s, p) - wp.outer(pull, first_moment / own[7])
             pull *= scale
+            store_vec4(data.state, at + 4, wp.vec4(pull[0], pull[1], pull[2], alone))
+        if wp.static(tensile):
+            # With the correction of its gradient stress does on the particles exactly the work of the strain.
+            t = scale * (span * stress * correction)
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], t[0, 0]))
             store_vec4(data.state, at + 2, wp.vec4(t[0, 1], t[0, 2], t[1, 0], t[1, 1]))
             store_vec4(data.state, at + 3, wp.vec4(t[1, 2], t[2, 0], t[2, 1], t[2, 2]))
-            store_vec4(data.state, at + 4, wp.vec4(pull[0], pull[1], pull[2], alone))
         else:
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], scale * p))
         if wp.static(changing):

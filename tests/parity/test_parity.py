@@ -73,6 +73,7 @@ CASES = {
     "liquid": tank({"density": 1000.0}),
     "viscous": tank({"density": 1000.0, "viscosity": 2.0, "equation_of_state": "tait"}, CLOSED),
     "thick": tank({"density": 1000.0, "viscosity": 50.0}, CLOSED, numerics=SOLVED),
+    "setting": tank({"density": 1000.0, "viscosity": 2.0, "cure": {"kind": "linear", "time": 0.1, "viscosity": 20.0}}),
     "paste": tank(PASTE),
     "viscous paste": tank(PASTE | {"viscosity": 1.0, "flow_index": 1.0}, CLOSED),
     "viscoelastic": tank(

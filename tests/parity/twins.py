@@ -35,7 +35,8 @@ BY_WIDTH = {
     "state": {
         8: [*PLACE, VELOCITY, (7, 8)],
         12: [*PLACE, VELOCITY, *((k, k + 1) for k in range(7, 12))],
-        20: [*PLACE, VELOCITY, (7, 16), (16, 19)],
+        16: [*PLACE, VELOCITY, (7, 16)],
+        20: [*PLACE, VELOCITY, (7, 16), *((k, k + 1) for k in range(16, 20))],
         24: [*PLACE, VELOCITY, (7, 16), (16, 19), *((k, k + 1) for k in range(20, 24))],
     },
 }
