@@ -151,7 +151,7 @@ def rubbed(box, x, v, inward_pull, walls, h):
 
 
 @ti.func
-def drifted(num, phase, rho, rest, grown, second, first_moment):
+def drifted(num, phase, rho, rest, grown, flows, second, first_moment):
     """What is summed beyond what is integrated, where the neighbourhood is whole or too crowded: see particle.py."""
     drift = second * num.lattice / 3.0 - rho
     whole = 1.0
@@ -164,6 +164,8 @@ def drifted(num, phase, rho, rest, grown, second, first_moment):
     drift = gap if drift > 0.0 else -gap
     if phase.relaxation_rate > 0.0 or grown:
         drift = ti.max(drift, ti.min(rest - rho, 0.0))
+    if not flows:
+        drift = ti.max(drift, 0.0)
     return whole * drift
 
 
@@ -278,15 +280,17 @@ def passes(strength: bool, tensile: bool, viscous: bool, changing: bool) -> Simp
                         z = off_linear_after(z, gradient, off, kept, h)
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
                 inflow, crowd = approach, vector_at(sums, 4) / rho
-                if flows and not is_solid(phase):
+                flows = flows and not is_solid(phase)
+                if flows:
                     if ti.static(strength and changing):
                         enclosed = ti.math.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
                         crowd += grown * enclosed / rho * first_moment
-                    drift = drifted(num, phase, rho, rest, grown, second, first_moment)
-                    inflow += num.density_feedback * sound / num.h * drift
                     inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
+                if flows or grown:
+                    drift = drifted(num, phase, rho, rest, grown, flows, second, first_moment)
+                    inflow += num.density_feedback * sound / num.h * drift
                 shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
                 rho += h * inflow
                 if rho <= -rest or beyond(rho, CRUSHED * rest):

@@ -212,9 +212,10 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if not flows:
             crowd = broken(crowd, num.broken)
         data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * strain)
-        if flows:
-            drift = drifted(num, phase, rho, rest, grown, second, first_moment)
+        if flows or grown:
+            drift = drifted(num, phase, rho, rest, grown, flows, second, first_moment)
             inflow += num.density_feedback * sound / num.h * drift
+        if flows:
             inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
         rho += h * inflow
         if not (rho > -rest and rho < CRUSHED * rest):
