@@ -70,7 +70,7 @@ CASE = Case(
     "emission",
     "exact: Hagen-Poiseuille",
     "|dp/dz / (4 tau_w / D) - 1|",
-    spacing=DIAMETER / 8,
+    spacing=DIAMETER / 12,
     tolerance=0.10,
     scenarios=scenarios,
     evaluate=evaluate,

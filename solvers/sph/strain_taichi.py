@@ -1,0 +1,209 @@
+"""The first sum over neighbours of SPH in Taichi: strain_warp.py, written anew from the same equations."""
+
+from typing import Any
+
+from fluidbench.method.frame import CARRIED
+from fluidbench.native.pool import FAULT_STATE
+
+from ..aging import GROWN
+from ..corrected import EDGE, INSIDE, LEANING, SOUND
+from ..corrected_taichi import (
+    elastic_stress,
+    from_before,
+    least_eigenvalue,
+    spanned,
+    strain_by_chords,
+    symmetric_inverse,
+)
+from ..crowding import FARTHEST
+from ..flow_taichi import pressure, shear_rate, strained
+from ..hourglass_taichi import off_linear_after
+from ..neighbours_taichi import BoxT, ListsT, image_gradient, image_velocity
+from ..pairs_taichi import (
+    matrix_into,
+    over_pairs,
+    reader,
+    stressed,
+    symmetric_at,
+    vector_at,
+    vector_into,
+    writer,
+)
+from ..smoothing import wendland
+from ..taichi_bridge import (
+    Floats,
+    Ints,
+    Phases,
+    Quads,
+    Vectors,
+    beyond,
+    is_solid,
+    mat3,
+    phase_at,
+    taichi_func,
+    ti,
+    vec3,
+    vec4,
+)
+from .force_warp import width_of
+from .particle_taichi import SmoothingT, drifted, slope
+from .strain_warp import CRUSHED, FLOOR, MATTER
+
+kernel = taichi_func(wendland)
+matter_at = reader(MATTER)
+
+
+@ti.func
+def matter_seen(box, extra: ti.template(), row, j, code):
+    """A row of `strain` in the walls."""
+    moved = vector_into(row, 4, image_velocity(box, vector_at(row, 4), code))
+    return vector_into(moved, 8, image_gradient(box, vector_at(row, 8), code))
+
+
+def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
+    """The kernel, see strain_warp.py."""
+    width = width_of(strength, tensile, changing)
+    last, many = width - 4, 25 if strength else 22 if tensile else 10
+    write_state = writer(width)
+
+    @ti.func
+    def strain_pair(num, own, begun, other, r):
+        u = vector_at(own, 4) - vector_at(other, 4)
+        w, partner, partner_gradient = other[3] * slope(r.norm() / num.h, num.h), other[7], vector_at(other, 8)
+        if ti.static(changing):  # in volumes and compressions
+            relative = own[11] / other[11]
+            w, partner, partner_gradient = w * relative, partner * relative, partner_gradient * relative
+        sums = ti.Vector.zero(ti.f32, many)
+        sums[0] = w * (own[7] - partner - (vector_at(own, 8) + partner_gradient).dot(r))
+        sums = vector_into(sums, 1, w * r)
+        near = (kernel(r.norm() / num.h, num.h) / num.near) ** 4
+        sums = vector_into(sums, 4, ti.max(near - 1.0, 0.0) * w * r)
+        if ti.static(strength):
+            sums = vector_into(sums, 22, w * u)
+        if ti.static(tensile):
+            sums = matrix_into(sums, 7, -w * u.outer_product(r))
+            square = -w * r.outer_product(r)
+            sums = vector_into(sums, 16, vec3(square[0, 0], square[1, 1], square[2, 2]))
+            sums = vector_into(sums, 19, vec3(square[0, 1], square[0, 2], square[1, 2]))
+        else:
+            ur, r2 = u.dot(r), r.norm_sqr()
+            sums[7], sums[8], sums[9] = -w * r2, w * ur, -w * ur * ur / (r2 + 0.01 * num.h * num.h)
+        return sums
+
+    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen)
+
+    @ti.kernel
+    def strain(
+        num: SmoothingT,
+        box: BoxT,
+        lists: ListsT,
+        entries: Ints,
+        number: Ints,
+        inside: Ints,
+        capacity: int,
+        count: Ints,
+        matter: Quads,
+        dt: Floats,
+        phases: Phases,
+        phase_of: Ints,
+        held: Ints,
+        growth: Floats,
+        elastic_normal: Vectors,
+        elastic_shear: Vectors,
+        off_linear: Vectors,
+        plastic: Floats,
+        new_density: Floats,
+        state: Quads,
+        shift: Vectors,
+        fault: Ints,
+    ):
+        for i in range(held.shape[0]):
+            world = i // capacity
+            if i - world * capacity < count[world]:
+                phase = phase_at(phases, world, phase_of[i])
+                own = matter_at(matter, i)
+                rho, rest, sound = own[7], phase.density, phase.wave_speed
+                if ti.static(changing):
+                    rest = own[11]
+                    sound *= ti.sqrt(phase.density / rest)
+                grown = rest < GROWN * phase.density
+                sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
+                spread, first_moment = sums[0], vector_at(sums, 1)
+                second, approach, sheared, alone, least, flows, h = 0.0, 0.0, 0.0, 0.0, 0.0, True, dt[world]
+                gradient, deformation, correction, span = mat3(0.0), mat3(0.0), mat3(0.0), mat3(0.0)
+                b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
+                if ti.static(tensile):
+                    moment = symmetric_at(sums, 16)
+                    second = moment.trace()
+                    correction = symmetric_inverse(moment / rho)
+                    gradient = stressed(sums, 7) @ correction / rho
+                    span = spanned(moment / rho, correction)
+                    deformation = strain_by_chords(span, gradient, h)
+                    gradient = span @ gradient
+                    approach = -rho * deformation.trace()
+                    sheared = shear_rate(gradient)
+                    least = least_eigenvalue(moment / rho)
+                else:
+                    second, approach = sums[7], sums[8]
+                    sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
+                if ti.static(strength):
+                    b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
+                    off = (vector_at(sums, 22) - gradient @ first_moment) / rho
+                    alone = ti.math.clamp((EDGE - least) / (EDGE - SOUND), 0.0, 1.0)
+                    if least < SOUND:
+                        off, z = vec3(0.0), vec3(0.0)
+                        if ti.static(changing):
+                            approach -= rho * growth[i]
+                    if held[i] != CARRIED:
+                        kept = 1.0
+                        turned = from_before(deformation, gradient, h)
+                        b, s, kept = strained(phase, phase.shear_modulus, turned, b, s, h, i, plastic)
+                        flows = kept < 1.0 or phase.shear_modulus <= 0.0
+                        z = off_linear_after(z, gradient, off, kept, h)
+                        elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
+                inflow, crowd = approach, vector_at(sums, 4) / rho
+                flows = flows and not is_solid(phase)
+                if flows:
+                    if ti.static(strength and changing):
+                        enclosed = ti.math.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
+                        crowd += grown * enclosed / rho * first_moment
+                    inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
+                else:
+                    crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
+                if flows or grown:
+                    drift = drifted(num, phase, rho, rest, grown, flows, second, first_moment)
+                    inflow += num.density_feedback * sound / num.h * drift
+                shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
+                rho += h * inflow
+                if rho <= -rest or beyond(rho, CRUSHED * rest):
+                    ti.atomic_or(fault[0], FAULT_STATE)
+                rho = ti.max(rho, FLOOR * rest)
+                new_density[i] = rho
+                p = pressure(rho / rest - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+                scale = 1.0 / (rho * rho)
+                if ti.static(changing):
+                    scale *= rest
+                row = ti.Vector.zero(ti.f32, width)
+                for c in ti.static(range(7)):
+                    row[c] = own[c]
+                cauchy = mat3(0.0)
+                for c in ti.static(range(3)):
+                    cauchy[c, c] = -p
+                if ti.static(strength):
+                    damping = 0.1 * num.artificial_viscosity * num.h * sound * rho
+                    packing = ti.max(num.lattice * second / (3.0 * rho), 1.0)
+                    pull = num.compact / packing**2 * (num.hourglass * phase.shear_modulus * z + damping * off)
+                    cauchy = elastic_stress(phase.shear_modulus * rho / rest, b, s, p)
+                    cauchy -= pull.outer_product(first_moment / own[7])
+                    row = vector_into(row, 16, scale * pull)
+                    row[19] = alone
+                if ti.static(tensile):
+                    row = matrix_into(row, 7, scale * (span @ cauchy @ correction))
+                else:
+                    row[7] = scale * p
+                if ti.static(changing):
+                    row = vector_into(row, last, vec3(rho, rest, phase.viscosity))
+                    row[last + 3] = sound
+                write_state(state, i, row)
+
+    return strain
