@@ -1,7 +1,5 @@
 """The material law on Warp's vectors and matrices."""
 
-from typing import Any
-
 import warp as wp
 
 from fluidbench.native.pool import MOST, Pool
@@ -16,16 +14,6 @@ pressure = warp_func(constitutive.pressure)
 strain_and_flow = warp_func(constitutive.strain_and_flow, constitutive.flow_stress)
 hardened = warp_func(constitutive.hardened)
 plastic_strain = warp_func(constitutive.plastic_strain)
-
-
-TENSE = 1e-4  # lack of density that a tension is worth: what carries less carries none, for nobody would see
-
-
-def is_tensile(scene: Scene) -> bool:
-    """Whether anything carries a tension, now or later: what has strength, and liquids by that of their own viscosity
-    (`tension_limit`)."""
-    phases: Any = scene.phases.numpy()
-    return scene.elastic or bool((phases["tension_limit"] > TENSE * phases["bulk_modulus"]).any())
 
 
 def plastic_strains(scene: Scene, pool: Pool) -> wp.array:

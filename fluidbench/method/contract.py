@@ -152,9 +152,6 @@ class Session(ABC):
         cannot be told."""
         raise UserError("its particles are its own")
 
-    def allow_tension(self) -> None:  # noqa: B027
-        """Let liquids carry tension instead of cavitating: for experiments on stability."""
-
     def state(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         """Everything that a run must have to go on as it was: on the host, as JSON can hold it, and as arrays."""
         raise NotImplementedError("it cannot be resumed")

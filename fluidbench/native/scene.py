@@ -139,10 +139,7 @@ class Scene:
         phase.relaxation_rate = 0.0 if material.relaxation_time is None else 1.0 / material.relaxation_time
         phase.flow_index = material.flow_index
         phase.tait = 1.0 if material.equation_of_state == "tait" else 0.0
-        # Unless told, a liquid cavitates rather than carry tension, but for that of its own viscosity; what has shear
-        # stiffness holds together.
-        limit = scenario.viscous_tension if material.youngs_modulus is None else NEVER_YIELDS
-        phase.tension_limit = limit if material.tension_limit is None else min(material.tension_limit, NEVER_YIELDS)
+        phase.tension_limit = min(scenario.tension(material), NEVER_YIELDS)
         return phase
 
     def _any(self, holds: Callable[[Material], bool]) -> bool:
@@ -188,11 +185,10 @@ class Scene:
         """Threads of a kernel that strides over all its work: one on the CPU, a full device on CUDA."""
         return 1 if self.device.is_cpu else 256 * 1024
 
-    def allow_tension(self) -> None:
-        """Let liquids carry tension instead of cavitating."""
-        table = self.phases.numpy()
-        table["tension_limit"] = float(NEVER_YIELDS)
-        self.phases.assign(table)
+    @property
+    def tensile(self) -> bool:
+        """Whether matter of any world carries tension."""
+        return any(s.is_tensile for s in self.scenarios)
 
     def set_dt(self, dt: float) -> None:
         if not math.isfinite(dt) or dt <= 0:

@@ -303,9 +303,6 @@ class Simulation(Session):
     def kick(self, velocity: np.ndarray) -> None:
         self.pool.velocity.assign(velocity.astype(np.float32))
 
-    def allow_tension(self) -> None:
-        self.scene.allow_tension()
-
     @property
     def capacity(self) -> int:
         return self.pool.size

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 LONGEST_NAME = 80
 AGES = 65  # ages at which bounds look at a material that changes
+TENSE = 1e-4  # lack of density that a tension is worth: what carries less carries none, for nobody would see
 
 
 class Scenario(Model):
@@ -277,6 +278,19 @@ class Scenario(Model):
         m, speed = self.material, self.reference_speed
         free = 0.0 if not self.bodies else m.viscosity * speed / self.narrowest
         return max(self.feeding_pressure, min(free, m.density * speed**2))
+
+    def tension(self, material: Material) -> float:
+        """At which a material of this scenario cavitates [Pa]: unless told, a liquid at that of its own viscosity, what
+        has shear stiffness never."""
+        if material.tension_limit is not None:
+            return material.tension_limit
+        return self.viscous_tension if material.youngs_modulus is None else math.inf
+
+    @property
+    def is_tensile(self) -> bool:
+        """Whether any of its matter carries a tension worth mentioning."""
+        sound = self.liquid_sound_speed
+        return any(m.elastic or self.tension(m) > TENSE * m.bulk(sound) for m in self.aged[1])
 
     @property
     def wave_speed(self) -> float:

@@ -70,7 +70,7 @@ def _alike(method: type[Method], first: Scenario, other: Scenario) -> bool:
 def _kind(scenario: Scenario) -> tuple[bool, ...]:
     """What sort of matter it is."""
     m = scenario.material
-    return m.youngs_modulus is None, m.relaxation_time is None, m.is_solid, m.hardening is None
+    return m.youngs_modulus is None, m.relaxation_time is None, m.is_solid, m.hardening is None, scenario.is_tensile
 
 
 def run_batches(task: Task) -> dict[str, Any]:

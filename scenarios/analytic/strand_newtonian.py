@@ -109,7 +109,7 @@ CASE = Case(
     causes={
         "mpm": "contact 15.2 % short at 1.0 D, 22 % at D / 12 (and area 2.2 % at 0.6 D): the wedge beside the contact "
         "is finer than the deposit's resolution",
-        "sph": "at 1.0 D contact 33 % and area 5 % short, 20 and 1.5 % at D / 12: the wedge beside the contact is finer "
-        "than the deposit's resolution",
+        "sph": "at 1.0 D contact 33 % and area 5 % short, 20 and 1.5 % at D / 12: the wedge beside the contact is "
+        "finer than the deposit's resolution",
     },
 )

@@ -18,7 +18,6 @@ from fluidbench.scenario import Scenario
 from .. import aging
 from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
-from ..flow import is_tensile
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import present_density
 from ..search import FAULT_NEIGHBOURS
@@ -112,7 +111,7 @@ class SolverPBD(Solver):
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
-        self.drawn = is_tensile(scene)
+        self.drawn = scene.tensile
         self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
         self.num = numbers_of(config, scene.spacing, scene.scenario.material)

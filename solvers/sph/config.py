@@ -35,7 +35,8 @@ class ConfigSPH(Config):
     )
     shifting: NonNegative = Field(4.0, description="shift out of a crowd, over strain and h^2 times its gradient")
     density_feedback: NonNegative = Field(
-        0.05, description="rate, in c / h, at which integrated density follows the summed one, where matter flows"
+        0.05,
+        description="rate, in c / h, at which integrated density follows the summed one, in what flows or has grown",
     )
     density_tolerance: NonNegative = Field(0.03, description="gap between the two that is left alone, over the density")
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")

@@ -64,21 +64,11 @@ def broken(crowd: wp.vec3, limit: float):
 
 
 @wp.func
-def drifted(
-    num: Smoothing,
-    phase: Phase,
-    rho: float,
-    rest: float,
-    grown: bool,
-    flows: bool,
-    second: float,
-    first_moment: wp.vec3,
-):
+def drifted(num: Smoothing, phase: Phase, rho: float, rest: float, grown: bool, second: float, first_moment: wp.vec3):
     """By how much the density that particles really have exceeds the one that they integrate, rho [kg/m^3].
 
     Taken from the second moment where the neighbourhood is complete (it leans to no side), or too crowded for any; what
-    lies within the tolerance is left alone. What has grown, and does not flow, is only made denser: where fresh foam
-    rises against cured foam neither flows, each sees half of the motion, and they came to lie within each other.
+    lies within the tolerance is left alone.
     """
     drift = second * num.lattice / 3.0 - rho
     whole = wp.max(1.0 - wp.length(first_moment) * num.h / (WHOLE * rho), 0.0)
@@ -92,6 +82,4 @@ def drifted(
         # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and would be
         # pulled closer
         drift = wp.max(drift, wp.min(rest - rho, 0.0))
-    if not flows:
-        drift = wp.max(drift, 0.0)
     return whole * drift

@@ -10,7 +10,7 @@ SmoothingT = struct_of(Smoothing)
 
 
 @ti.func
-def drifted(num, phase, rho, rest, grown, flows, second, first_moment):
+def drifted(num, phase, rho, rest, grown, second, first_moment):
     """What is summed beyond what is integrated, where the neighbourhood is whole or too crowded: see particle.py."""
     drift = second * num.lattice / 3.0 - rho
     whole = 1.0
@@ -23,6 +23,4 @@ def drifted(num, phase, rho, rest, grown, flows, second, first_moment):
     drift = gap if drift > 0.0 else -gap
     if phase.relaxation_rate > 0.0 or grown:
         drift = ti.max(drift, ti.min(rest - rho, 0.0))
-    if not flows:
-        drift = ti.max(drift, 0.0)
     return whole * drift

@@ -21,7 +21,7 @@ from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..crowding import crowding, nearest
-from ..flow import is_tensile, plastic_strains
+from ..flow import plastic_strains
 from ..lattice import lattice_moments, opposing, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
@@ -128,8 +128,7 @@ class SolverSPH(Solver):
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
         self.implicit = scene.viscous and config.viscosity == "implicit"
-        self.tensile = is_tensile(scene)
-        self.width = width_of(scene.elastic, self.tensile, scene.changes)
+        self.width = width_of(scene.elastic, scene.tensile, scene.changes)
         self.kernels = self.kernels_of(backend)
         self.num = Smoothing()
         ratio = config.smoothing(scene.scenario.material)
@@ -174,7 +173,7 @@ class SolverSPH(Solver):
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
         scene = self.scene
-        variant = scene.elastic, self.tensile, scene.viscous and not self.implicit, scene.changes
+        variant = scene.elastic, scene.tensile, scene.viscous and not self.implicit, scene.changes
         if backend == "taichi":
             from . import kernels_taichi
 

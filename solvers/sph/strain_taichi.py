@@ -171,7 +171,9 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
                 if flows or grown:
-                    drift = drifted(num, phase, rho, rest, grown, flows, second, first_moment)
+                    drift = drifted(num, phase, rho, rest, grown, second, first_moment)
+                    if not flows:
+                        drift = ti.max(drift, 0.0)
                     inflow += num.density_feedback * sound / num.h * drift
                 shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
                 rho += h * inflow

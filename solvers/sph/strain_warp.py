@@ -213,7 +213,11 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             crowd = broken(crowd, num.broken)
         data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * strain)
         if flows or grown:
-            drift = drifted(num, phase, rho, rest, grown, flows, second, first_moment)
+            drift = drifted(num, phase, rho, rest, grown, second, first_moment)
+            if not flows:
+                # Where fresh foam rises against cured foam neither flows, and each sees half of the motion: they came
+                # to lie within each other. What rests is told of such a crowd; of a lack it must not make tension.
+                drift = wp.max(drift, 0.0)
             inflow += num.density_feedback * sound / num.h * drift
         if flows:
             inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho

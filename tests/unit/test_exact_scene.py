@@ -203,8 +203,6 @@ def test_a_step_of_time_is_positive_and_reaches_every_world():
     for dt in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(ValueError, match="dt must be positive"):
             scene.set_dt(dt)
-    scene.allow_tension()
-    assert scene.phases.numpy()["tension_limit"].ravel().tolist() == pytest.approx([float(NEVER_YIELDS)] * 2)
 
 
 def test_matter_cavitates_at_the_tension_that_the_scenario_gives():

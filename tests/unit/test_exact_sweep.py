@@ -123,6 +123,12 @@ def test_keys_of_a_nozzle_need_one():
         points_of(fb.load("dam_break"), {SPEED: [0.1, 0.2]})
 
 
+def test_what_cavitates_does_not_share_with_what_holds_together():
+    honey = fb.load("honey_line", {"material.sound_speed": 5.0})  # the same whatever the viscosity
+    scenarios = [s for _, s in points_of(honey, {"material.tension_limit": [0.0, 1e3, 2e3]})]
+    assert shared(get_method("sph"), scenarios, Target(), 64) == [[0], [1, 2]]
+
+
 def test_points_that_a_method_runs_by_other_schemes_do_not_share():
     scenarios = [s for _, s in points_of(BEAD, {"material.viscosity": [1.0, 1e4, 2.0]})]
     assert shared(get_method("sph"), scenarios, Target(), 64) == [[0, 2], [1]]
