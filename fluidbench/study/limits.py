@@ -20,6 +20,7 @@ from ..method.target import Target
 from ..method.timestep import SPEED_MARGIN
 from ..scenario import Scenario
 from ..scenario.body import Body
+from ..scenario.model import LARGEST
 
 GROWTH, STEPS, LOOKS = (
     100.0,
@@ -27,7 +28,6 @@ GROWTH, STEPS, LOOKS = (
     4,
 )  # energy ratio; steps of a trial; steps between looks: what blows up must not escape
 CELLS = 8  # particles along an edge of a block
-UNTORN = 1.0e18  # tension that nothing reaches [Pa]
 LUMP = 6  # particles along an edge of a lump
 LUMP_STEPS = 400  # default steps of a trial
 AMPLITUDE = 1e-4  # random velocity over the wave speed
@@ -79,7 +79,7 @@ def block(material: dict[str, Any], spacing: float) -> Scenario:
         {
             "name": "block",
             "domain": {"lower": (0, 0, 0), "upper": (edge,) * 3, "walls": walls},
-            "material": {**material, "tension_limit": UNTORN},
+            "material": {**material, "tension_limit": LARGEST},
             "gravity": (0, 0, 0),
             "bodies": [{"kind": "box", "center": (edge / 2,) * 3, "size": (edge,) * 3}],
             "duration": 1.0,

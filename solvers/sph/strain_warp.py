@@ -215,8 +215,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if flows or grown:
             drift = drifted(num, phase, rho, rest, grown, second, first_moment)
             if not flows:
-                # Where fresh foam rises against cured foam neither flows, and each sees half of the motion: they came
-                # to lie within each other. What rests is told of such a crowd; of a lack it must not make tension.
+                # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with
+                # no pressure to say so. What rests is told of such a crowd; of a lack it must not make tension.
                 drift = wp.max(drift, 0.0)
             inflow += num.density_feedback * sound / num.h * drift
         if flows:
