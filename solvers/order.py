@@ -39,7 +39,7 @@ def cell_keys(
 class CellOrder:
     """Sort keys of a pool for cells of given edges [m], the first of which begins `shift` edges below the domain."""
 
-    def __init__(self, scene: Scene, pool: Pool, cell: float | np.ndarray, shift: float = 0.0) -> None:
+    def __init__(self, scene: Scene, pool: Pool, cell: float | np.ndarray, shift: float | np.ndarray = 0.0) -> None:
         self.scene, self.pool = scene, pool
         cell = np.broadcast_to(cell, 3)
         domain = scene.scenario.domain

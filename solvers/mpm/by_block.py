@@ -14,12 +14,9 @@ from .patches import add_up, gather, resist, scatter
 class ByBlock:
     """What the block-wise transfers allocate, and their launches; for one thread of the CPU or several."""
 
-    def __init__(
-        self, scene: Scene, pool: Pool, strains: list[wp.array], growth: wp.array, slots: int, resists: bool
-    ) -> None:
-        """`strains` are the fields of the pool that a step strains; `growth` as in particle.rising; `resists`: whether
-        viscosity is implicit."""
-        self.strains, self.growth = strains, growth
+    def __init__(self, scene: Scene, pool: Pool, strains: list[wp.array], slots: int, resists: bool) -> None:
+        """`strains` are the fields of the pool that a step strains; `resists`: whether viscosity is implicit."""
+        self.strains = strains
         self.scene, self.pool, self.launch, self.lanes = scene, pool, scene.crew.launch, scene.crew.threads
         homes = self.homes = Homes()
         with wp.ScopedDevice(scene.device):
@@ -68,7 +65,6 @@ class ByBlock:
                 pool.volume,
                 pool.phase,
                 pool.held,
-                self.growth,
                 hours.row,
                 hours.exit,
             ],
@@ -124,7 +120,6 @@ class ByBlock:
                 scene.phases,
                 pool.phase,
                 pool.held,
-                self.growth,
                 shifting,
                 pitch,
                 hours.row,

@@ -1,8 +1,9 @@
 """The background grid of MPM: blocks of 4 x 4 x 4 nodes, allocated where there is material.
 
-Node 4 of a walled axis lies on the lower wall, node 4 + cells on the upper one; a periodic axis has `cells` nodes from
-node `first` on, so placed that no block holds just one of them: then any three neighbours lie in two blocks. `table`
-holds slot + 1 of each block of each world, 0 where there is none.
+Walls lie halfway between nodes, where splines join: node 5 of a walled axis is half a cell in front of the lower wall,
+node 4 + cells of the upper one, and the next beyond each is its image. A periodic axis has `cells` nodes from node
+`first` on, so placed that no block holds just one of them: then any three neighbours lie in two blocks. `table` holds
+slot + 1 of each block of each world, 0 where there is none.
 """
 
 import numpy as np
@@ -16,7 +17,7 @@ from fluidbench.scenario import Domain
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-FIRST = 4  # node index of the lower walls: one block of ghost nodes lies behind them
+FIRST = 5  # the first node in front of lower walls: so the one behind them lies in its block
 FAULT_BLOCKS = 1
 MAX_BLOCKS = 2**30
 
@@ -28,7 +29,7 @@ class Grid:
     inv_dx: wp.vec3  # [1/m]
     inv_volume: float  # of a cell [1/m^3]
     cells: wp.vec3i
-    first: wp.vec3i  # node at the lower face
+    first: wp.vec3i  # node in front of the lower face; at it, where that is periodic
     wrap: wp.vec3i  # cells along periodic axes, else 0
     blocks: wp.vec3i
     blocks_per_world: int
@@ -42,16 +43,17 @@ class Grid:
 
 
 def cells_of(domain: Domain, wanted: float) -> tuple[np.ndarray, np.ndarray]:
-    """(cells, edges of a cell [m]) along each axis: walls lie on nodes, so that an edge is what comes nearest to
-    `wanted` and divides the domain."""
+    """(cells, edges of a cell [m]) along each axis: what comes nearest to `wanted` and divides the domain; two walls
+    share no cell."""
     length = np.asarray(domain.upper) - np.asarray(domain.lower)
-    cells = np.maximum(1, np.rint(length / wanted)).astype(int)
+    least = np.where(domain.walls.periodic(), 1, 2)
+    cells = np.maximum(least, np.rint(length / wanted)).astype(int)
     return cells, length / cells
 
 
 def blocks_along(cells: np.ndarray) -> np.ndarray:
     """Blocks of 4 nodes along each axis."""
-    return (cells + 2 * FIRST + 2) // 4 + 1
+    return (cells + FIRST) // 4 + 1
 
 
 def blocks_of(domain: Domain, wanted: float) -> float:
@@ -64,11 +66,12 @@ def grid_of(scene: Scene, wanted: float) -> Grid:
     domain, grid = scene.scenario.domain, Grid()
     cells, dx = cells_of(domain, wanted)
     lone = np.asarray(scene.periodic) & (cells % 4 == 1)
-    first = np.where(lone, FIRST + 2, FIRST)
+    first = np.where(scene.periodic, np.where(lone, 6, 4), FIRST)
     blocks = blocks_along(cells)
     if int(np.prod(blocks)) * scene.worlds > MAX_BLOCKS:
         raise UserError(f"the domain holds {np.prod(blocks):.3g} grid blocks; use a smaller domain or a larger spacing")
-    grid.origin, grid.first = wp.vec3(*(np.asarray(domain.lower) - first * dx)), wp.vec3i(*first.tolist())
+    before = np.where(scene.periodic, first, first - 0.5)
+    grid.origin, grid.first = wp.vec3(*(np.asarray(domain.lower) - before * dx)), wp.vec3i(*first.tolist())
     grid.dx, grid.inv_dx, grid.inv_volume = wp.vec3(*dx), wp.vec3(*(1.0 / dx)), float(1.0 / dx.prod())
     grid.cells, grid.blocks = wp.vec3i(*cells.tolist()), wp.vec3i(*blocks.tolist())
     grid.wrap = wp.vec3i(*[int(n) if periodic else 0 for n, periodic in zip(cells, scene.periodic, strict=True)])

@@ -7,7 +7,7 @@ from fluidbench.native.scene import FRICTION, PERIODIC, STICK
 
 from ..taichi_bridge import Ints, Quads, Vectors, ivec3, struct_of, ti, vec3, vec4
 from .grid import FAULT_BLOCKS, FIRST, Grid
-from .walls import CONTACT_BEGINS, CONTACT_ENDS, THIN, TINY
+from .walls import CONTACT_BEGINS, CONTACT_ENDS, TINY
 
 GridT = struct_of(Grid)
 
@@ -86,31 +86,31 @@ def content(grid, world, node, table: ti.template(), raw: ti.template()):
 
 
 @ti.func
-def mirrors(kind):
-    """Slip and stick walls are mirrors; rough walls let material lift off."""
-    return kind != FRICTION and kind != PERIODIC
+def lower_nearer(grid, node, axis: ti.template()):
+    return 2 * (node[axis] - FIRST) < grid.cells[axis]
 
 
 @ti.func
 def kind_near(grid, node, axis: ti.template()):
     """Kind of the wall nearest to a node on an axis."""
     kind = grid.upper_kind[axis]
-    if 2 * (node[axis] - FIRST) < grid.cells[axis]:
+    if lower_nearer(grid, node, axis):
         kind = grid.lower_kind[axis]
     return kind
 
 
 @ti.func
 def near(grid, node, axis: ti.template()):
-    """Whether a node is on, one in front of, or behind a wall of this axis."""
-    return node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
+    """Whether a node is the first in front of a wall of this axis, or behind it."""
+    walled = grid.lower_kind[axis] != PERIODIC
+    return walled and (node[axis] <= FIRST or node[axis] >= FIRST + grid.cells[axis] - 1)
 
 
 @ti.func
 def near_any(grid, node):
     found = False
     for axis in ti.static(range(3)):
-        if grid.lower_kind[axis] != PERIODIC and near(grid, node, axis):
+        if near(grid, node, axis):
             found = True
     return found
 
@@ -120,73 +120,80 @@ def in_reach(grid, node):
     """Whether a particle in front of all walls can have this node among its own: one behind a wall at most."""
     reached = True
     for axis in ti.static(range(3)):
-        beyond = node[axis] < FIRST - 1 or node[axis] > FIRST + grid.cells[axis] + 1
+        beyond = node[axis] < FIRST - 1 or node[axis] > FIRST + grid.cells[axis]
         if grid.lower_kind[axis] != PERIODIC and beyond:
             reached = False
     return reached
 
 
 @ti.func
-def beyond_wall(grid, node, axis: ti.template(), cells):
-    """The node of the same column that is so many cells inside the wall nearest to it; behind it where negative."""
+def before_wall(grid, node, axis: ti.template(), number):
+    """The node of the same column that is the first (number 0), second, ... in front of the wall nearest to it."""
     out = node
-    out[axis] = FIRST + cells
-    if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
-        out[axis] = FIRST + grid.cells[axis] - cells
+    out[axis] = FIRST + number
+    if not lower_nearer(grid, node, axis):
+        out[axis] = FIRST + grid.cells[axis] - 1 - number
     return out
 
 
 @ti.func
 def contact(grid, world, node, axis: ti.template(), table: ti.template(), raw: ti.template()):
-    """Share, 0 to 1, with which the wall nearest to a node acts: all of it for mirrors, none for periodic axes, and by
+    """Share, 0 to 1, with which the wall nearest to a node acts: all of it for slip, none for periodic axes, and by
     how near matter is for rough and no-slip walls: the masses of the column's first two nodes tell."""
     kind = kind_near(grid, node, axis)
     share = 1.0
     if kind == PERIODIC:
         share = 0.0
     elif kind == FRICTION or kind == STICK:
-        first = content(grid, world, beyond_wall(grid, node, axis, 0), table, raw)[3]
-        second = content(grid, world, beyond_wall(grid, node, axis, 1), table, raw)[3]
+        first = content(grid, world, before_wall(grid, node, axis, 0), table, raw)[3]
+        second = content(grid, world, before_wall(grid, node, axis, 1), table, raw)[3]
         span = ti.max((CONTACT_ENDS - CONTACT_BEGINS) * second, TINY)
         share = ti.math.clamp((first - CONTACT_BEGINS * second) / span, 0.0, 1.0)
     return share
 
 
 @ti.func
-def in_front(grid, node, axis: ti.template()):
-    """Index, on one axis, of the node whose image in a mirroring wall this node is; its own where it is none."""
-    i, last = node[axis], FIRST + grid.cells[axis]
-    if i < FIRST and mirrors(grid.lower_kind[axis]):
-        i = 2 * FIRST - i
-    elif i > last and mirrors(grid.upper_kind[axis]):
-        i = 2 * last - i
-    return i
+def in_front(grid, node):
+    """The node in front of all walls whose image a node is; itself elsewhere."""
+    out = node
+    for axis in ti.static(range(3)):
+        if grid.lower_kind[axis] != PERIODIC:
+            if node[axis] < FIRST:
+                out[axis] = 2 * FIRST - 1 - node[axis]
+            elif node[axis] >= FIRST + grid.cells[axis]:
+                out[axis] = 2 * (FIRST + grid.cells[axis]) - 1 - node[axis]
+    return out
 
 
 @ti.func
 def behind(grid, node, axis: ti.template()):
-    """Index, on one axis, of the ghost node that a mirroring wall folds onto this one; its own where there is none."""
-    i, last = node[axis], FIRST + grid.cells[axis]
-    if node[axis] == FIRST + 1 and mirrors(grid.lower_kind[axis]):
-        i = FIRST - 1
-    if node[axis] == last - 1 and mirrors(grid.upper_kind[axis]):
-        i = last + 1
+    """Index, on one axis, of the node behind a wall that is folded onto this one; its own where there is none."""
+    i = node[axis]
+    if grid.lower_kind[axis] != PERIODIC:
+        if node[axis] == FIRST:
+            i = FIRST - 1
+        if node[axis] == FIRST + grid.cells[axis] - 1:
+            i = FIRST + grid.cells[axis]
     return i
 
 
 @ti.func
-def seen_in_wall(value, axis: ti.template(), kind):
-    """A momentum or velocity as its mirror image: slip turns the normal component round, stick all three."""
+def seen(grid, node, inside, value):
+    """What a node shows that is the image of the node inside: no-slip walls turn a vector round, others the component
+    across alone."""
     out = value
-    for a in ti.static(range(3)):
-        if kind == STICK or a == axis:
-            out[a] = -value[a]
+    for axis in ti.static(range(3)):
+        if inside[axis] != node[axis]:
+            kind = kind_near(grid, node, axis)
+            for a in ti.static(range(3)):
+                if kind == STICK or a == axis:
+                    out[a] = -out[a]
     return out
 
 
 @ti.func
 def folded(grid, world, node, touching, table: ti.template(), raw: ti.template()):
-    """Content of a node with that of its ghosts behind mirroring walls, seen in them, added."""
+    """Content of a node with that of its images behind the walls that act, seen in them, added."""
     ghost = node
     for axis in ti.static(range(3)):
         if touching[axis] == 1:
@@ -200,120 +207,68 @@ def folded(grid, world, node, touching, table: ti.template(), raw: ti.template()
                 exists = exists and ghost[axis] != node[axis]
                 at[axis] = ghost[axis]
         if exists:
-            value = content(grid, world, at, table, raw)
-            for axis in ti.static(range(3)):
-                if (subset >> axis) & 1 == 1:
-                    value = seen_in_wall(value, axis, kind_near(grid, at, axis))
-            total += value
+            total += seen(grid, at, node, content(grid, world, at, table, raw))
     return total
 
 
 @ti.func
-def bounded(grid, node, touching, velocity):
-    """A velocity that keeps out of the walls that a node lies on: none through them, none along no-slip walls, and
-    along rough ones less by up to friction times what was stopped (Coulomb)."""
+def pressed(grid, world, node, touching, axis: ti.template(), kick, table: ti.template(), raw: ti.template()):
+    """How fast matter in front of a friction wall would go into it if it were not there: see walls.py."""
+    others, ghost = touching, node
+    others[axis] = 0
+    ghost[axis] = behind(grid, node, axis)
+    front = folded(grid, world, node, others, table, raw)
+    back = folded(grid, world, ghost, others, table, raw)
+    mass = ti.max(front[3] + back[3], TINY)
+    across = (front[axis] - back[axis]) / mass + kick
+    lost = (front[axis] + back[axis]) / mass + kick - across * (front[3] - back[3]) / mass
+    if ghost[axis] < node[axis]:
+        lost = -lost
+    return lost
+
+
+@ti.func
+def facing(grid, node, touching):
+    """The node in front of the walls that act whose image a node is; itself elsewhere."""
+    inside = in_front(grid, node)
+    for axis in ti.static(range(3)):
+        if touching[axis] == 0:
+            inside[axis] = node[axis]
+    return inside
+
+
+@ti.func
+def touched(grid, world, node, kick, table: ti.template(), raw: ti.template()):
+    """(per axis 1 where a wall acts on a node; how far they act; how fast friction walls are pressed against)."""
+    touching, hold, into = ivec3(0), 1.0, vec3(0.0)
+    for axis in ti.static(range(3)):
+        share = contact(grid, world, node, axis, table, raw)
+        if near(grid, node, axis) and share > 0.0:
+            hold = ti.min(hold, share)
+            touching[axis] = 1
+    for axis in ti.static(range(3)):
+        if touching[axis] == 1 and kind_near(grid, node, axis) == FRICTION:
+            into[axis] = pressed(grid, world, facing(grid, node, touching), touching, axis, kick[axis], table, raw)
+            if into[axis] <= 0.0:
+                touching[axis] = 0
+    return touching, hold, into
+
+
+@ti.func
+def rubbed(grid, node, into, velocity):
+    """A velocity after the friction walls that a node is pressed against: less along them by up to friction times what
+    they stop (Coulomb)."""
     v = velocity
     for axis in ti.static(range(3)):
-        low, high = node[axis] <= FIRST, node[axis] >= FIRST + grid.cells[axis]
-        if touching[axis] == 1 and (low or high):
-            kind, friction, outward = grid.lower_kind[axis], grid.lower_friction[axis], -1.0
-            if high:
-                kind, friction, outward = grid.upper_kind[axis], grid.upper_friction[axis], 1.0
-            into = outward * v[axis]
-            if kind == STICK:
-                v = vec3(0.0)
-            elif kind != FRICTION:
-                v[axis] = 0.0
-            elif into > 0.0:
-                v[axis] = 0.0
-                v *= 1.0 - ti.min(friction * into / ti.max(v.norm(), 1.0e-12), 1.0)
+        if into[axis] > 0.0:
+            friction = grid.upper_friction[axis]
+            if lower_nearer(grid, node, axis):
+                friction = grid.lower_friction[axis]
+            across = v[axis]
+            v[axis] = 0.0
+            v *= 1.0 - ti.min(friction * into[axis] / ti.max(v.norm(), 1.0e-12), 1.0)
+            v[axis] = across
     return v
-
-
-@ti.func
-def on_wall(grid, node, axis: ti.template()):
-    return node[axis] == FIRST or node[axis] == FIRST + grid.cells[axis]
-
-
-@ti.func
-def squeezed(grid, world, node, inside, touching, kick, result, table: ti.template(), raw: ti.template()):
-    """A node's velocities, those across no-slip walls as of matter that goes as z^2: -U/3 on the wall, U beside it."""
-    out = result
-    for axis in ti.static(range(3)):
-        free, sign = True, 1.0
-        others = touching
-        others[axis] = 0
-        for other in ti.static(range(3)):
-            if others[other] == 1 and kind_near(grid, node, other) == STICK:
-                if on_wall(grid, inside, other):
-                    free = False
-                if inside[other] != node[other]:
-                    sign = -sign
-        if touching[axis] == 1 and kind_near(grid, node, axis) == STICK and free:
-            middle = folded(grid, world, beyond_wall(grid, inside, axis, 0), others, table, raw)
-            sides = folded(grid, world, beyond_wall(grid, inside, axis, 1), others, table, raw)
-            sides += folded(grid, world, beyond_wall(grid, inside, axis, -1), others, table, raw)
-            u = 0.0
-            if sides[3] > 0.0:
-                mass = ti.max(sides[3] - middle[3] / 3.0, THIN * sides[3])
-                u = sign * ((sides[axis] - middle[axis] / 3.0) / mass + kick[axis])
-            out[axis] = u
-            if on_wall(grid, node, axis):
-                out[axis] = -u / 3.0
-    return out
-
-
-@ti.func
-def beside_wall(gap):
-    """(u / (g dx), du/dz / g) that nodes leave out `gap` cells from a no-slip wall: see particle.py."""
-    on, behind = 0.0, 0.0
-    if gap < 0.5:
-        on, behind = 0.75 - gap * gap, 0.5 * (0.5 - gap) ** 2
-    elif gap < 1.5:
-        on = 0.5 * (1.5 - gap) ** 2
-    return ti.Vector([on / 3.0 - 2.0 * behind, 8.0 * (1.0 + gap) * behind - 4.0 * gap * on / 3.0])
-
-
-@ti.func
-def rising(grid, x, g):
-    """(velocity, diagonal of its gradient) that growth at g adds to what nodes beside no-slip walls know."""
-    v, c = vec3(0.0), vec3(0.0)
-    if g != 0.0:
-        for axis in ti.static(range(3)):
-            if grid.lower_kind[axis] == STICK:
-                low = beside_wall((x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
-                v[axis] += g * grid.dx[axis] * low[0]
-                c[axis] += g * low[1]
-            if grid.upper_kind[axis] == STICK:
-                high = beside_wall((grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
-                v[axis] -= g * grid.dx[axis] * high[0]
-                c[axis] += g * high[1]
-    return v, c
-
-
-@ti.func
-def near_walls(grid, x, c):
-    """The affine field that carries momentum; du/dz near a no-slip wall times (1 + 2 (z / 1.5)^2) / 3, z in cells."""
-    out = c
-    for axis in ti.static(range(3)):
-        gap = 1.5
-        if grid.lower_kind[axis] == STICK:
-            gap = ti.min(gap, (x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
-        if grid.upper_kind[axis] == STICK:
-            gap = ti.min(gap, (grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
-        out[axis, axis] *= (1.0 + 2.0 * (gap / 1.5) ** 2) / 3.0
-    return out
-
-
-@ti.func
-def share_inside(grid, node):
-    """Inverse of the part of a node's cell that lies inside the walls."""
-    share = 1.0
-    for axis in ti.static(range(3)):
-        on = node[axis] == FIRST or node[axis] == FIRST + grid.cells[axis]
-        if on and grid.lower_kind[axis] != PERIODIC:
-            share *= 2.0
-    return share
 
 
 @ti.func

@@ -1,7 +1,8 @@
 """Viscosity implicit in time, for MPM: backward Euler on the grid, by conjugate gradients.
 
-p* are the momenta that particles scatter, B what makes velocities of the nodes from momenta: one over their mass, and
-the walls. Viscosity adds the momenta -dt A v at the velocities v = B q at the end of the step,
+p* are the momenta that particles scatter, B what makes velocities of the nodes from momenta: one over their mass, the
+walls, and nothing where the piston is (piston.py). Viscosity adds the momenta -dt A v at the velocities v = B q at the
+end of the step,
 
     (1 + dt A B) q = p*,    (A v)_i = 4 / dx^2 sum_p w_ip V_p 2 eta dev(D_p) (x_i - x_p),    D_p = sym C_p(v):
 
@@ -105,7 +106,7 @@ class GridViscosity:
 
     def _apply(self) -> None:
         """answer = B residual."""
-        self.solver.walled(self.residual, self.no_force, self.answer)
+        self.solver.walled(self.residual, self.no_force, self.solver.unmoved, self.answer)
 
     def _lanes(self) -> list[Any]:
         return [self.solver.node_lanes, self.solver.active]

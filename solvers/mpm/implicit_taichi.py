@@ -4,8 +4,6 @@ anew from the same equations (implicit.py)."""
 import functools
 from types import SimpleNamespace
 
-from fluidbench.native.scene import PERIODIC
-
 from ..conjugate_taichi import STEP, TURN, Table, Twos, note, weigh_start, weigh_step, weigh_turn
 from ..taichi_bridge import (
     Floats,
@@ -26,11 +24,9 @@ from .grid_taichi import (
     GridT,
     address,
     base_node,
-    bounded,
     in_front,
-    kind_near,
     node_at,
-    seen_in_wall,
+    seen,
     slots_in_use,
     wrapped,
 )
@@ -74,17 +70,9 @@ def divide(worlds: int, number: Ints, many: Ints, begin: Ints):
 @ti.func
 def pushed(grid, world, node, h, force: ti.template()):
     """See implicit_warp.py."""
-    inside, touching = node, ivec3(0)
-    for axis in ti.static(range(3)):
-        if grid.lower_kind[axis] != PERIODIC:
-            touching[axis] = 1
-            inside[axis] = in_front(grid, node, axis)
-    v = bounded(grid, inside, touching, h * force_at(force, world, grid.origin + grid.dx * inside))
-    kick = vec4(v[0], v[1], v[2], 0.0)
-    for axis in ti.static(range(3)):
-        if inside[axis] != node[axis]:
-            kick = seen_in_wall(kick, axis, kind_near(grid, node, axis))
-    return kick
+    inside = in_front(grid, node)
+    v = h * force_at(force, world, grid.origin + grid.dx * inside)
+    return seen(grid, node, inside, vec4(v[0], v[1], v[2], 0.0))
 
 
 @ti.kernel

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from fluidbench.native.crew import index_of
-from fluidbench.native.scene import PERIODIC, Force, Phase, force_at
+from fluidbench.native.scene import Force, Phase, force_at
 from fluidbench.native.vector_access import in_company
 
 from ..conjugate_warp import Totals, note, weigh_start, weigh_step, weigh_turn
@@ -18,7 +18,7 @@ from .kernels_warp import sums_of
 from .particle import affine_of, resistance_of, viscous, weights
 from .ranks import PART, PARTS, Ranks, count_off, divide, line_up, sum_of, world_of
 from .together import scatter_together, stencil
-from .walls import flipped, mirror, wall_kind, wall_velocity
+from .walls import in_front, seen
 
 wp.set_module_options({"enable_backward": False})  # no fast math: what is no number must end the iterations
 
@@ -37,19 +37,10 @@ def product(a: wp.vec4, b: wp.vec4):
 @wp.func
 def pushed(grid: Grid, node: wp.vec3i, dt: float, force: Force):
     """What forces of the scene add to a node's velocity within dt, as it is where all walls act."""
-    inside, touching = node, wp.vec3i(0, 0, 0)
-    for axis in range(3):
-        if grid.lower_kind[axis] != PERIODIC:
-            touching[axis] = 1
-            inside[axis] = mirror(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
+    inside = in_front(grid, node)
     place = grid.origin + wp.cw_mul(grid.dx, wp.vec3(float(inside[0]), float(inside[1]), float(inside[2])))
-    v = wall_velocity(grid, inside, touching, dt * force_at(force, place))
-    kick = wp.vec4(v[0], v[1], v[2], 0.0)
-    for axis in range(3):
-        if inside[axis] != node[axis]:
-            kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
-            kick = flipped(kick, axis, kind)
-    return kick
+    v = dt * force_at(force, place)
+    return seen(grid, node, inside, wp.vec4(v[0], v[1], v[2], 0.0))
 
 
 @wp.kernel

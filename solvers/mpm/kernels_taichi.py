@@ -34,26 +34,21 @@ from .grid_taichi import (
     GridT,
     address,
     base_node,
-    bounded,
     claim,
     clear_grid,
-    contact,
     contained,
+    facing,
     find_blocks,
     folded,
     in_front,
     in_reach,
-    kind_near,
-    near,
     near_any,
-    near_walls,
     node_at,
     reset_blocks,
-    rising,
-    seen_in_wall,
-    share_inside,
+    rubbed,
+    seen,
     slots_in_use,
-    squeezed,
+    touched,
     wrapped,
 )
 from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
@@ -128,7 +123,6 @@ def g2p(
     phases: Phases,
     phase_of: Ints,
     held: Ints,
-    growth: Floats,
     shifting: float,
     pitch: float,
     row: Ints,
@@ -151,10 +145,6 @@ def g2p(
             f = (x - grid.origin) * grid.inv_dx - base
             w = weights(f)
             gathered, moment, density, lean = gathered_from(grid, world, base, f, w, table, moving)
-            lift, steeper = rising(grid, x, growth[ti.min(p, growth.shape[0] - 1)] * (held[p] == FREE))
-            gathered += lift
-            for axis in ti.static(range(3)):
-                moment[axis, axis] += steeper[axis]
             affine[p] = moment
             phase = phase_at(phases, world, phase_of[p])
             if held[p] == FREE:
@@ -218,7 +208,6 @@ def passes(alone: bool) -> SimpleNamespace:
         volume: Floats,
         phase_of: Ints,
         held: Ints,
-        growth: Floats,
         row: Ints,
         exit: Vectors,
         table: Ints,
@@ -236,18 +225,11 @@ def passes(alone: bool) -> SimpleNamespace:
                 phase = phase_at(phases, world, phase_of[p])
                 inertia = mass[p]
                 heavy = held[p] == CLAMPED
-                if held[p] == CARRIED and drags == 0:
-                    z, reach = position[p][2], 1.5 * grid.dx[2]
-                    heavy = z > exit[row[0]][2] + reach and z < grid.upper[2] - reach
                 if heavy:
                     inertia *= ANCHOR
                 a = mat3(0.0)  # momentum per distance from the particle
-                lift, steeper = rising(grid, position[p], growth[ti.min(p, growth.shape[0] - 1)] * (held[p] == FREE))
                 if held[p] == FREE:
-                    seen = c
-                    for axis in ti.static(range(3)):
-                        seen[axis, axis] -= steeper[axis]
-                    a = inertia * near_walls(grid, position[p], seen)
+                    a = inertia * c
                 j, b, s = volume_ratio[p], elastic_normal[p], elastic_shear[p]
                 if held[p] != CARRIED and h > 0.0:
                     t = c.trace()
@@ -257,7 +239,7 @@ def passes(alone: bool) -> SimpleNamespace:
                         b, s, _ = strained(phase, phase.shear_modulus, c, b, s, h, p, plastic)
                         elastic_normal[p], elastic_shear[p] = b, s
                     volume_ratio[p] = j
-                if h > 0.0 and (held[p] != CARRIED or drags == 0):
+                if h > 0.0 and held[p] != CARRIED:
                     tau = kirchhoff(phase, j, b, s)
                     if drags == 1 and phase.viscosity > 0.0:
                         tau += viscous(phase, j, c)
@@ -265,7 +247,7 @@ def passes(alone: bool) -> SimpleNamespace:
                 base = base_node(grid, position[p])
                 f = (position[p] - grid.origin) * grid.inv_dx - base
                 w = weights(f)
-                own = inertia * (velocity[p] - lift)
+                own = inertia * velocity[p]
                 for o, q in ti.ndrange(3, 3):
                     for r in ti.static(range(3)):
                         at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
@@ -300,36 +282,30 @@ def passes(alone: bool) -> SimpleNamespace:
             wall = near_any(grid, node)
             result = vec4(0.0)
             if (wall or raw[t][3] > 0.0) and in_reach(grid, node):
-                inside, touching, hold = node, ivec3(0), 1.0
-                total = raw[t]
+                inside = in_front(grid, node)
+                place = grid.origin + grid.dx * inside
+                kick = dt[world] * force_at(force, world, place)
+                total, hold, into = raw[t], 1.0, vec3(0.0)
                 if wall:
-                    for axis in ti.static(range(3)):
-                        share = contact(grid, world, node, axis, table, raw)
-                        if near(grid, node, axis) and share > 0.0:
-                            hold = ti.min(hold, share)
-                            touching[axis] = 1
-                            inside[axis] = in_front(grid, node, axis)
+                    touching, held, pressing = touched(grid, world, node, kick, table, raw)
+                    hold, into = held, pressing
+                    inside = facing(grid, node, touching)
                     total = folded(grid, world, inside, touching, table, raw)
                 if total[3] > 0.0:
-                    kick = dt[world] * force_at(force, world, grid.origin + grid.dx * inside)
                     v = vec3(total[0], total[1], total[2]) / total[3] + kick
                     if piston.on == 1:
                         before = ti.max(row[0] - 1, 0)
-                        away = grid.origin + grid.dx * inside - exit[row[0]]
+                        away = place - exit[row[0]]
                         within = away[0] ** 2 + away[1] ** 2 < piston.bore and away[2] > -BELOW * grid.dx[2]
                         if within and feeding[before] > 0.0:
                             going = drift[before]
-                            v = vec3(going[0], going[1], ti.min(v[2], going[2] - feeding[before] * piston.speed))
-                    density = total[3] * grid.inv_volume
+                            down = going[2] - feeding[before] * piston.speed
+                            if piston.firm == 0:
+                                down = ti.min(v[2], down)
+                            v = (1 - piston.still) * vec3(going[0], going[1], down)
                     if wall:
-                        v = bounded(grid, inside, touching, v)
-                        density *= share_inside(grid, inside)
-                    result = vec4(v[0], v[1], v[2], density)
-                    for axis in ti.static(range(3)):
-                        if inside[axis] != node[axis]:
-                            result = seen_in_wall(result, axis, kind_near(grid, node, axis))
-                    if wall:
-                        result = squeezed(grid, world, node, inside, touching, kick, result, table, raw)
+                        v = rubbed(grid, node, into, v)
+                    result = seen(grid, node, inside, vec4(v[0], v[1], v[2], total[3] * grid.inv_volume))
                     if hold < 1.0:  # between a wall that acts in full and none
                         own = raw[t]
                         free = vec4(0.0, 0.0, 0.0, result[3])

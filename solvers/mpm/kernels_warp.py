@@ -13,7 +13,6 @@ from fluidbench.native.scene import Force, Phase, force_at
 from fluidbench.native.vector_access import in_company, load_vec4
 
 from .grid import (
-    FIRST,
     Grid,
     activate_stencil,
     clear_grid,
@@ -25,22 +24,10 @@ from .grid import (
     slots_of,
     turns,
 )
-from .particle import FAULT_STENCIL, affine_of, inertia, moved, rising, shifted, stressed, taken, weights
+from .particle import FAULT_STENCIL, affine_of, inertia, moved, shifted, stressed, taken, weights
 from .piston import Piston, driven
 from .together import scatter_together, stencil
-from .walls import (
-    beside,
-    flipped,
-    folded,
-    grip,
-    in_reach,
-    mirror,
-    near_wall,
-    plane_share,
-    unbound,
-    wall_kind,
-    wall_velocity,
-)
+from .walls import facing, folded, in_front, in_reach, near_any, rubbed_by_walls, seen, touched, unbound
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -62,7 +49,6 @@ def p2g(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
-    growth: wp.array(dtype=float),
     row: wp.array(dtype=int),
     exit: wp.array(dtype=wp.vec3),
     table: wp.array(dtype=int),
@@ -84,7 +70,6 @@ def p2g(
         p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
     phase = phases[world, phase_of[p]]
     m = inertia(grid, mass[p], held[p], position[p], drags, row, exit)
-    lift, growing = rising(grid, position[p], p, held, growth)
     a = stressed(
         grid,
         dt[world],
@@ -95,7 +80,6 @@ def p2g(
         position[p],
         affine,
         m,
-        growing,
         volume,
         held,
         volume_ratio,
@@ -127,7 +111,7 @@ def p2g(
         wx,
         wy,
         wz,
-        m * (velocity[p] - lift) - a * f,
+        m * velocity[p] - a * f,
         m,
         a,
     )
@@ -148,11 +132,7 @@ def grid_step(
     # outputs
     moving: wp.array(dtype=wp.vec4),
 ):
-    """Velocity of every node from momentum, gravity, a piston and walls; the fourth component is its density [kg/m^3].
-
-    Ghost nodes behind a mirroring wall get the mirrored velocity of their partner, so that the gather sees a true
-    mirror: zeroing them instead costs energy at every step.
-    """
+    """Velocity of every node from momentum, gravity, a piston and walls; fourth its density [kg/m^3]."""
     t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, raw.shape[0]))
     slot, world, corner = int(-1), int(0), wp.vec3i(0, 0, 0)
     while t < end:
@@ -161,43 +141,27 @@ def grid_step(
             world = block_of[slot] / grid.blocks_per_world
             corner = node_of(grid, block_of[slot] - world * grid.blocks_per_world, 0)
         node = corner + wp.vec3i((t & 63) >> 4, (t >> 2) & 3, t & 3)
-        wall = near_wall(grid, node)
+        wall = near_any(grid, node)
         result = wp.vec4(0.0, 0.0, 0.0, 0.0)
         if (wall or raw[t][3] > 0.0) and in_reach(grid, node):
+            inside = in_front(grid, node)
+            place = wp.vec3(float(inside[0]), float(inside[1]), float(inside[2]))
+            place = grid.origin + wp.cw_mul(grid.dx, place)
+            kick = dt[world] * force_at(force[world], place)
             total = raw[t]
-            inside = node
-            touching = wp.vec3i(0, 0, 0)
             hold = float(1.0)
+            into = wp.vec3(0.0, 0.0, 0.0)
             if wall:
-                for axis in range(3):
-                    near = node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1
-                    held = grip(grid, world, node, axis, table, raw)
-                    if near and held > 0.0:
-                        hold = wp.min(hold, held)
-                        touching[axis] = 1
-                        inside[axis] = mirror(
-                            node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis]
-                        )
+                touching, hold, into = touched(grid, world, node, kick, table, raw)
+                inside = facing(grid, node, touching)
                 total = folded(grid, world, inside, touching, table, raw)
             if total[3] > 0.0:
-                place = wp.vec3(float(inside[0]), float(inside[1]), float(inside[2]))
-                place = grid.origin + wp.cw_mul(grid.dx, place)
-                kick = dt[world] * force_at(force[world], place)
                 v = wp.vec3(total[0], total[1], total[2]) / total[3] + kick
                 if piston.on == 1:
                     v = driven(piston, grid, place, v)
                 if wall:
-                    v = wall_velocity(grid, inside, touching, v)
-                density = total[3] * grid.inv_volume
-                if wall:
-                    density *= plane_share(grid, inside)
-                result = wp.vec4(v[0], v[1], v[2], density)
-                if wall:
-                    for axis in range(3):
-                        if inside[axis] != node[axis]:
-                            kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
-                            result = flipped(result, axis, kind)
-                    result = beside(grid, world, node, inside, touching, kick, result, table, raw)
+                    v = rubbed_by_walls(grid, node, into, v)
+                result = seen(grid, node, inside, wp.vec4(v[0], v[1], v[2], total[3] * grid.inv_volume))
                 if hold < 1.0:
                     result = hold * result + (1.0 - hold) * unbound(raw[t], kick, result[3])
         moving[t] = result
@@ -261,7 +225,6 @@ def g2p(
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
-    growth: wp.array(dtype=float),
     shifting: float,
     pitch: float,
     row: wp.array(dtype=int),
@@ -286,10 +249,7 @@ def g2p(
         bx, by, bz, lx, ly, lz = node_parts(grid, base)
         s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
         sums = sums_of(moving, f, wx, wy, wz, bx, by, bz, lx, ly, lz, s0, s1, s2, s3, s4, s5, s6, s7)
-        lift, growing = rising(grid, x, p, held, growth)
-        for axis in range(3):
-            sums[0, axis] += lift[axis]
-        c = affine_of(grid, sums) + wp.diag(growing)
+        c = affine_of(grid, sums)
         affine[p] = c
         v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
         x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], pitch, volume_ratio[p], held[p])

@@ -6,27 +6,53 @@ import warp as wp
 from .grid import Grid, activate_stencil, first_node, node_at
 from .homes import on_grid
 from .particle import weights
+from .walls import in_front
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 
 @wp.func
+def signs_of(node: wp.vec3i, inside: wp.vec3i):
+    """Of a vector's components as seen in walls by a node that is the image of the node inside."""
+    signs = wp.vec3(1.0, 1.0, 1.0)
+    for axis in range(3):
+        if inside[axis] != node[axis]:
+            signs[axis] = -1.0
+    return signs
+
+
+@wp.func
 def tell_nodes(
-    grid: Grid, world: int, x: wp.vec3, row: wp.vec4, table: wp.array(dtype=int), nodes: wp.array(dtype=wp.vec4)
+    grid: Grid,
+    world: int,
+    x: wp.vec3,
+    vector: bool,
+    row: wp.vec4,
+    table: wp.array(dtype=int),
+    nodes: wp.array(dtype=wp.vec4),
 ):
-    """Add w row to the active ones of the 27 nodes around x."""
+    """Add w row to the active ones of the 27 nodes around x, to those in front of walls for their images, in which a
+    vector's component across is turned round."""
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
+                node = base + wp.vec3i(o, q, r)
+                inside = in_front(grid, node)
+                at = node_at(grid, world, on_grid(grid, inside), table)
                 if at >= 0:
-                    wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * row)
+                    told = row
+                    if vector:
+                        signs = signs_of(node, inside)
+                        told = wp.vec4(signs[0] * row[0], signs[1] * row[1], signs[2] * row[2], row[3])
+                    wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * told)
 
 
 @wp.func
-def mean_of_nodes(grid: Grid, world: int, x: wp.vec3, table: wp.array(dtype=int), nodes: wp.array(dtype=wp.vec4)):
+def mean_of_nodes(
+    grid: Grid, world: int, x: wp.vec3, vector: bool, table: wp.array(dtype=int), nodes: wp.array(dtype=wp.vec4)
+):
     """The mean at x of what nodes were told in three components; the fourth is its weight."""
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
@@ -34,10 +60,15 @@ def mean_of_nodes(grid: Grid, world: int, x: wp.vec3, table: wp.array(dtype=int)
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
+                node = base + wp.vec3i(o, q, r)
+                inside = in_front(grid, node)
+                at = node_at(grid, world, on_grid(grid, inside), table)
                 if at >= 0 and nodes[at][3] > 0.0:
                     share = wx[o] * wy[q] * wz[r] / nodes[at][3]
-                    mean += share * wp.vec3(nodes[at][0], nodes[at][1], nodes[at][2])
+                    heard = wp.vec3(nodes[at][0], nodes[at][1], nodes[at][2])
+                    if vector:
+                        heard = wp.cw_mul(signs_of(node, inside), heard)
+                    mean += share * heard
     return mean
 
 

@@ -5,7 +5,7 @@ import warp as wp
 from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.native.crew import raise_fault
 from fluidbench.native.pool import FAULT_ASTRAY
-from fluidbench.native.scene import STICK, Phase, is_solid, too_fast
+from fluidbench.native.scene import Phase, is_solid, too_fast
 
 from ..bind import warp_func
 from ..flow import pressure, shear_rate, strained
@@ -101,74 +101,16 @@ def inertia(
 ):
     """With which a particle takes part in the momentum of its nodes [kg].
 
-    With explicit viscosity and no rigid body the grid is pushed as piston.py says. Elsewhere what is carried is as
-    heavy as a clamp as far above the exit as nodes reach, and yields to nothing; what is carried below that passes its
-    push on by the pressure and viscosity of a liquid.
+    Where there is no rigid body the grid is pushed as piston.py says. Beside one, what is carried is as heavy as a
+    clamp as far above the exit as nodes reach, and yields to nothing; what is carried below that passes its push on by
+    the pressure and viscosity of a liquid.
     (Not beneath a ceiling whose nodes it would share: these do not move.)
     """
     heavy = held == CLAMPED
-    if held == CARRIED and drags != EXPLICIT:
+    if held == CARRIED and drags == PRESSED:
         reach = 1.5 * grid.dx[2]
         heavy = x[2] > exit[row[0]][2] + reach and x[2] < grid.upper[2] - reach
     return wp.where(heavy, ANCHOR * mass, mass)
-
-
-@wp.func
-def near_walls(grid: Grid, x: wp.vec3, c: wp.mat33):
-    """The affine field of what carries momentum, du/dz within reach of a no-slip wall times (1 + 2 (z / 1.5 dx)^2) / 3.
-
-    There u goes as z^2 (walls.beside), and the second moment of the weights about a particle is not dx^2 / 4: with that
-    of the open field each transfer amplifies u up to threefold; with this factor the largest eigenvalue of a transfer
-    is 1, for one particle as for many, wherever they are.
-    """
-    out = c
-    for axis in range(3):
-        gap = float(1.5)
-        if grid.lower_kind[axis] == STICK:
-            gap = wp.min(gap, (x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
-        if grid.upper_kind[axis] == STICK:
-            gap = wp.min(gap, (grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
-        out[axis, axis] = out[axis, axis] * (1.0 + 2.0 * (gap / 1.5) * (gap / 1.5)) / 3.0
-    return out
-
-
-@wp.func
-def beside_wall(gap: float):
-    """(u / (g dx), du/dz / g) that what rises at g = du/dz lacks `gap` cells from a no-slip wall, where nodes know of
-    no growth: N0 / 3 - 2 N-1 and 8 (1 + gap) N-1 - 4 gap N0 / 3, with weights N of the nodes on and behind the wall.
-    """
-    on = float(0.0)
-    if gap < 0.5:
-        on = 0.75 - gap * gap
-    elif gap < 1.5:
-        on = 0.5 * (1.5 - gap) * (1.5 - gap)
-    behind = float(0.0)
-    if gap < 0.5:
-        behind = 0.5 * (0.5 - gap) * (0.5 - gap)
-    return on / 3.0 - 2.0 * behind, 8.0 * (1.0 + gap) * behind - 4.0 * gap * on / 3.0
-
-
-@wp.func
-def rising(grid: Grid, x: wp.vec3, p: int, held: wp.array(dtype=int), growth: wp.array(dtype=float)):
-    """(velocity [m/s], diagonal of its gradient [1/s]) that growth adds to what nodes beside no-slip walls know: these
-    take u and du/dz there for zero, which holds for what keeps its volume; what grows at g has du/dz = g.
-
-    `growth`: rates of the rest volume [1/s], or a single zero where nothing grows.
-    """
-    v = wp.vec3(0.0, 0.0, 0.0)
-    c = wp.vec3(0.0, 0.0, 0.0)
-    g = growth[wp.min(p, growth.shape[0] - 1)]
-    if g != 0.0 and held[p] == FREE:
-        for axis in range(3):
-            if grid.lower_kind[axis] == STICK:
-                lift, steeper = beside_wall((x[axis] - grid.lower[axis]) * grid.inv_dx[axis])
-                v[axis] += g * grid.dx[axis] * lift
-                c[axis] += g * steeper
-            if grid.upper_kind[axis] == STICK:
-                lift, steeper = beside_wall((grid.upper[axis] - x[axis]) * grid.inv_dx[axis])
-                v[axis] -= g * grid.dx[axis] * lift
-                c[axis] += g * steeper
-    return v, c
 
 
 @wp.func
@@ -191,7 +133,6 @@ def stressed(
     x: wp.vec3,
     affine: wp.array(dtype=wp.mat33),
     m: float,
-    growing: wp.vec3,
     volume: wp.array(dtype=float),
     held: wp.array(dtype=int),
     volume_ratio: wp.array(dtype=float),
@@ -208,7 +149,7 @@ def stressed(
     s = elastic_shear[p]
     a = wp.mat33()
     if held[p] == FREE or (held[p] == CARRIED and drags == PRESSED):
-        a = columns_scaled(m * near_walls(grid, x, c - wp.diag(growing)), grid.dx)
+        a = columns_scaled(m * c, grid.dx)
     if (held[p] != CARRIED or drags == PRESSED) and on and dt > 0.0:
         j *= wp.max(stretch(c, dt), 0.1)
         volume_ratio[p] = j
@@ -216,7 +157,7 @@ def stressed(
             b, s, _kept = strained(phase, phase.shear_modulus, c, b, s, dt, p, plastic)
             elastic_normal[p] = b
             elastic_shear[p] = s
-    if on and dt > 0.0 and (held[p] != CARRIED or drags != EXPLICIT):
+    if on and dt > 0.0 and (held[p] != CARRIED or drags == PRESSED):
         tau = kirchhoff(phase, j, b, s)
         if drags != IMPLICIT and phase.viscosity > 0.0:
             tau += viscous(phase, j, c)

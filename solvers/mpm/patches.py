@@ -12,7 +12,7 @@ from fluidbench.native.scene import Phase
 
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
-from .particle import affine_of, inertia, moved, resistance_of, rising, shifted, stressed, taken, viscous, weights
+from .particle import affine_of, inertia, moved, resistance_of, shifted, stressed, taken, viscous, weights
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -140,7 +140,6 @@ def scatter(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
-    growth: wp.array(dtype=float),
     row: wp.array(dtype=int),
     exit: wp.array(dtype=wp.vec3),
     # outputs
@@ -159,7 +158,6 @@ def scatter(
             world = p / capacity
             phase = phases[world, phase_of[p]]
             m = inertia(grid, mass[p], held[p], position[p], drags, row, exit)
-            lift, growing = rising(grid, position[p], p, held, growth)
             a = stressed(
                 grid,
                 dt[world],
@@ -170,7 +168,6 @@ def scatter(
                 position[p],
                 affine,
                 m,
-                growing,
                 volume,
                 held,
                 volume_ratio,
@@ -180,7 +177,7 @@ def scatter(
             )
             base = first_node(grid, position[p])
             f, wx, wy, wz = weights(grid, position[p], base)
-            momentum = m * (velocity[p] - lift) - a * f
+            momentum = m * velocity[p] - a * f
             at = start + place_in_patch(grid, base)
             add_to_nodes(homes.patch, at, wx, wy, wz, momentum, m, a)
         h += 1
@@ -232,7 +229,6 @@ def gather(
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
-    growth: wp.array(dtype=float),
     shifting: float,
     pitch: float,
     row: wp.array(dtype=int),
@@ -258,10 +254,7 @@ def gather(
             base = first_node(grid, x)
             f, wx, wy, wz = weights(grid, x, base)
             sums = taken_from_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, f)
-            lift, growing = rising(grid, x, p, held, growth)
-            for axis in range(3):
-                sums[0, axis] += lift[axis]
-            c = affine_of(grid, sums) + wp.diag(growing)
+            c = affine_of(grid, sums)
             affine[p] = c
             v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
             x += shifted(

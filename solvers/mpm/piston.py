@@ -5,7 +5,9 @@ m (U - u) / dt, to which matter of stress sigma yields by U - u = sigma dt / (rh
 quarter to a half of the piston's speed so, between bursts. So the nodes within the bore, from the first row at the
 exit upwards, move with the piston: no slower down, for what flows away faster is not held back, and sideways with the
 bore. Only while it extrudes: what lifts does not pull at what it has laid. And only of a plug: where a profile has
-developed, matter at the rim hardly moves.
+developed, matter at the rim hardly moves. Where viscosity is solved for, the piston is firm: its nodes move at its
+speed, not faster either (which would make of it another equation with every velocity), and whatever pushes at them
+changes nothing.
 """
 
 from typing import Any
@@ -28,6 +30,8 @@ class Piston:
     """Where the bore is, and how it moves: rows of ticks (fluidbench.native.clock)."""
 
     on: int
+    firm: int  # 1 where what is faster is held back, too
+    still: int  # 1 where it is asked by how much its nodes yield to what pushes: not at all
     bore: float  # radius squared [m^2]
     speed: float  # of what leaves it while it extrudes [m/s]
     row: wp.array(dtype=int)  # of the end of the tick that substeps are in
@@ -36,12 +40,13 @@ class Piston:
     feeding: wp.array(dtype=float)
 
 
-def piston_of(scene: Scene, acts: bool) -> Any:
+def piston_of(scene: Scene, acts: bool, firm: bool = False, still: bool = False) -> Any:
     """The piston of a scene that is fed, if it `acts`."""
     piston, hours = Piston(), scene.clock.hours
     radius, speed = scene.clock.bore
     for name in ("row", "exit", "drift", "feeding"):
         setattr(piston, name, getattr(hours, name))
+    piston.firm, piston.still = int(firm), int(still)
     if acts and radius > 0.0:
         piston.on, piston.bore, piston.speed = 1, radius * radius, speed
     return piston
@@ -56,6 +61,10 @@ def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
     feeding = piston.feeding[before]
     away = x - piston.exit[row]
     if feeding > 0.0 and away[2] > -BELOW * grid.dx[2] and away[0] * away[0] + away[1] * away[1] < piston.bore:
-        drift = piston.drift[before]
-        out = wp.vec3(drift[0], drift[1], wp.min(v[2], drift[2] - feeding * piston.speed))
+        out = piston.drift[before]
+        out[2] -= feeding * piston.speed
+        if piston.firm == 0:
+            out[2] = wp.min(v[2], out[2])
+        if piston.still == 1:
+            out = wp.vec3(0.0, 0.0, 0.0)
     return out

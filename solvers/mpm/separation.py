@@ -67,13 +67,12 @@ def through(
     volume: wp.array(dtype=float),
     sums: Sums,
 ):
-    """The sums of particle i at x, gone on with over the images of all others of this code, or them themselves (0);
-    mirrored ones crowd nobody."""
+    """The sums of particle i at x, gone on with over the images of all of this code, its own as well, or the others
+    themselves (0)."""
     signs = wp.vec3(1.0, 1.0, 1.0)
     for axis in range(3):
         if face_kind(box, code, axis) != PERIODIC:
             signs[axis] = -1.0
-    mirrored = signs[0] + signs[1] + signs[2] < 3.0
     at = image_position(box, x, undoing(box, code))  # where it sees others as it sees their images from x
     middle = cell_of(at, cells.width)
     for c in range(27):
@@ -82,13 +81,11 @@ def through(
         for m in range(start, start + cells.number[bucket]):
             r = wp.cw_mul(signs, at - place(cells.spot[m]))
             length = wp.length(r)
-            if length < cells.width and (code > 0 or cells.members[m] != i):
+            if length < cells.width and length > 0.0 and (code > 0 or cells.members[m] != i):
                 w = slope(length / num.h, num.h) * volume[cells.members[m]]
-                crowds = float(0.0)
-                if not mirrored:
-                    crowds = excess(length, num.h, num.near)
+                crowds = excess(length, num.h, num.near) * w
                 for a in range(3):
-                    sums[a] += crowds * w * r[a]
+                    sums[a] += crowds * r[a]
                 if num.evens == 1:
                     for a in range(3):
                         sums[3 + a] += w * r[a]
@@ -138,10 +135,9 @@ def separate(
         if held[i] == FREE and flows:
             x = position[i]
             near = near_faces(box, x, cells.width, True)
-            if num.evens == 1:
-                walls = near_faces(box, x, cells.width, False)
-                for axis in range(3):
-                    near[axis] = near[axis] | walls[axis]
+            walled = near_faces(box, x, cells.width, False)
+            for axis in range(3):
+                near[axis] = near[axis] | walled[axis]
             codes = int(1)
             if near[0] + near[1] + near[2] > 12:
                 codes = 27
@@ -176,7 +172,7 @@ def spread(
     p = wp.tid()
     world = p / capacity
     if p - world * capacity < count[world] and shift[p][3] > 0.0:
-        tell_nodes(grid, world, position[p], mass[p] * shift[p], table, nodes)
+        tell_nodes(grid, world, position[p], True, mass[p] * shift[p], table, nodes)
 
 
 @wp.kernel
@@ -201,7 +197,7 @@ def shift_apart(
     world = p / capacity
     if p - world * capacity < count[world] and shift[p][3] > 0.0:
         x = position[p]
-        by = wp.vec3(shift[p][0], shift[p][1], shift[p][2]) - mean_of_nodes(grid, world, x, table, nodes)
+        by = wp.vec3(shift[p][0], shift[p][1], shift[p][2]) - mean_of_nodes(grid, world, x, True, table, nodes)
         by *= wp.min(1.0, LONGEST * spacing / wp.max(wp.length(by), 1.0e-12))
         if wp.length(by) > 0.0:
             position[p] = contained(grid, x + by)

@@ -124,20 +124,16 @@ class SolverMPM(Solver):
         pool.add_field("elastic_shear", wp.vec3)
         self.strains = [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear, plastic_strains(scene, pool)]
         with wp.ScopedDevice(scene.device):
-            self.growth = pool.growth if scene.grows else wp.zeros(1, dtype=float)
             self.table = wp.zeros(blocks, dtype=int)
             self.block_of = wp.zeros(slots, dtype=int)
             self.active = wp.zeros(1, dtype=int)
             self.raw = wp.empty(slots * 64, dtype=NODE)
             self.moving = wp.empty(slots * 64, dtype=NODE)
         self.started = False
-        self.order = CellOrder(
-            scene, pool, np.array(self.grid.dx), shift=0.5
-        )  # particles of one cell share their 27 nodes
+        # particles of one cell share their 27 nodes
+        self.order = CellOrder(scene, pool, np.array(self.grid.dx), shift=np.where(scene.periodic, 0.5, 0.0))
         self.by_block = (
-            ByBlock(scene, pool, self.strains, self.growth, slots, implicit)
-            if scene.device.is_cpu and backend == "warp"
-            else None
+            ByBlock(scene, pool, self.strains, slots, implicit) if scene.device.is_cpu and backend == "warp" else None
         )
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
@@ -146,7 +142,8 @@ class SolverMPM(Solver):
         apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
         self.arranges = EVERY if apart else 0
-        self.piston = piston_of(scene, not implicit and self.held is None)
+        self.piston = piston_of(scene, self.held is None, firm=implicit)
+        self.unmoved = piston_of(scene, self.held is None, still=True)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
@@ -255,7 +252,6 @@ class SolverMPM(Solver):
                 pool.volume,
                 pool.phase,
                 pool.held,
-                self.growth,
                 hours.row,
                 hours.exit,
                 self.table,
@@ -264,14 +260,14 @@ class SolverMPM(Solver):
         )
 
     def grid_step(self) -> None:
-        self.walled(self.raw, self.scene.force, self.moving)
+        self.walled(self.raw, self.scene.force, self.piston, self.moving)
         if self.viscosity is not None:
             self.viscosity.solve()
 
-    def walled(self, raw: wp.array, force: wp.array, moving: wp.array) -> None:
-        """Velocities of nodes from their momenta and masses, a force for dt, and walls."""
+    def walled(self, raw: wp.array, force: wp.array, piston: Any, moving: wp.array) -> None:
+        """Velocities of nodes from their momenta and masses, a force for dt, a piston and walls."""
         lanes = [self.grid, self.node_lanes, self.active, self.block_of, self.table]
-        self._launch("grid_step", self.node_lanes, [*lanes, raw, self.scene.dt, force, self.piston], [moving])
+        self._launch("grid_step", self.node_lanes, [*lanes, raw, self.scene.dt, force, piston], [moving])
 
     def resist(self, nodes: wp.array, image: wp.array) -> None:
         """What viscosity resists the velocities of nodes with, added to momenta: dt A v of implicit.py."""
@@ -314,7 +310,6 @@ class SolverMPM(Solver):
                 scene.phases,
                 pool.phase,
                 pool.held,
-                self.growth,
                 self.shifting,
                 0.0 if self.held else scene.spacing,
                 hours.row,

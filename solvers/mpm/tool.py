@@ -132,7 +132,7 @@ def spread(
     world = p / capacity
     if p - world * capacity < count[world]:
         row = volume[p] * wp.vec4(volume_ratio[p], 0.0, 0.0, 1.0)
-        tell_nodes(grid, world, position[p], row, table, nodes)
+        tell_nodes(grid, world, position[p], False, row, table, nodes)
 
 
 @wp.kernel
@@ -154,7 +154,7 @@ def level(
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
-        mean = mean_of_nodes(grid, world, position[p], table, nodes)[0]
+        mean = mean_of_nodes(grid, world, position[p], False, table, nodes)[0]
         part = DIFFUSION * dt[world] * phases[world, phase_of[p]].wave_speed * grid.inv_dx[0]
         volume_ratio[p] = volume_ratio[p] + wp.min(part, 1.0) * (mean - volume_ratio[p])
 

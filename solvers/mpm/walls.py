@@ -1,4 +1,12 @@
-"""Walls on the grid of MPM: mirrors, contact of rough walls, Coulomb friction; used by kernels_warp.grid_step."""
+"""Walls on the grid of MPM: mirrors, contact of rough walls, Coulomb friction; used by kernels_warp.grid_step.
+
+A wall lies halfway between two nodes, of which the one behind is the image of the one in front: what is scattered to it
+is folded back, and it has the mirrored velocity, so that the gather sees a true mirror (zeroing it instead costs energy
+at every step). Slip and friction turn the component across round, no-slip walls all three. The node in front so carries
+all of the mass beside a wall, and all of its weight: a layer that shears at its foot alone is held by exactly
+rho g h sin(a) there. About a node that lies on the wall and does not move, splines cannot bend as sharply, and half a
+cell of the layer weighs nothing.
+"""
 
 import warp as wp
 
@@ -8,13 +16,11 @@ from .grid import FIRST, Grid, raw_node
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-# Mass of a wall's node over that of the next one. Matter whose flat surface is g cells away from the wall gives
-# (1/2 - 3 g/4 + g^3/3) / (1 - (g + 1/2)^3/6): 0.51 at rest on it. Contact grows from g = 0.36 to 0.21.
-CONTACT_BEGINS, CONTACT_ENDS = wp.constant(0.28), wp.constant(0.37)
+# Mass of the first node in front of a wall over that of the next. Matter whose flat surface is g cells away from the
+# wall gives (5/6 - g/2 - g^2/2 + g^3/3) / (1 - g^3/6): 0.83 at rest on it. Contact grows from g = 0.47 to 0.30. Beyond
+# that, matter is caught before it has landed; nearer, disorder is taken for a gap, and what lies still is let go.
+CONTACT_BEGINS, CONTACT_ENDS = wp.constant(0.53), wp.constant(0.65)
 TINY = wp.constant(1.0e-30)
-# Least mass that moves across a no-slip wall over that of the nodes beside it: 0.83 in bulk, 0.67 for a row half a cell
-# away. A row nearer than that has next to none, and would break the bound on dt of an isolated particle.
-THIN = wp.constant(0.6)
 
 
 @wp.func
@@ -29,54 +35,54 @@ def grip(
     """How far, from 0 to 1, the wall nearest to a node on this axis acts on its column of nodes.
 
     Slip walls always act: they are symmetry planes. Rough walls act where material has arrived; otherwise a falling
-    body would be stopped, and squeezed, up to 1.5 dx above the floor (Nairn 2013, CMES 92:271, on contact by separation
+    body would be stopped, and squeezed, a cell above the floor (Nairn 2013, CMES 92:271, on contact by separation
     instead of by velocity). How near it is the masses of two nodes of the column say, whatever part of the column's
     width is filled: by the filling of one node matter that stands on the floor is let go at its edge, and creeps.
     """
-    plane = node
-    above = node
+    front = node
+    next = node
     kind = grid.lower_kind[axis]
-    plane[axis] = FIRST
-    above[axis] = FIRST + 1
+    front[axis] = FIRST
+    next[axis] = FIRST + 1
     if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
         kind = grid.upper_kind[axis]
-        plane[axis] = FIRST + grid.cells[axis]
-        above[axis] = FIRST + grid.cells[axis] - 1
+        front[axis] = FIRST + grid.cells[axis] - 1
+        next[axis] = FIRST + grid.cells[axis] - 2
     hold = float(1.0)
     if kind == PERIODIC:
         hold = 0.0
     elif kind == STICK or kind == FRICTION:
-        near = raw_node(grid, world, plane, table, raw)[3]
-        far = raw_node(grid, world, above, table, raw)[3]
+        near = raw_node(grid, world, front, table, raw)[3]
+        far = raw_node(grid, world, next, table, raw)[3]
         hold = wp.clamp((near - CONTACT_BEGINS * far) / wp.max((CONTACT_ENDS - CONTACT_BEGINS) * far, TINY), 0.0, 1.0)
     return hold
 
 
 @wp.func
 def mirror(node: int, cells: int, lower_kind: int, upper_kind: int):
-    """The node in front of a mirroring wall (slip, stick) whose image this node is; itself elsewhere."""
+    """The node in front of a wall whose image this node is; itself elsewhere."""
     inside = node
-    if node < FIRST and lower_kind != FRICTION and lower_kind != PERIODIC:
-        inside = 2 * FIRST - node
-    if node > FIRST + cells and upper_kind != FRICTION and upper_kind != PERIODIC:
-        inside = 2 * (FIRST + cells) - node
+    if node < FIRST and lower_kind != PERIODIC:
+        inside = 2 * FIRST - 1 - node
+    if node >= FIRST + cells and upper_kind != PERIODIC:
+        inside = 2 * (FIRST + cells) - 1 - node
     return inside
 
 
 @wp.func
 def image(node: int, cells: int, lower_kind: int, upper_kind: int):
-    """The ghost node whose content a mirroring wall folds onto this one; the node itself where there is none."""
+    """The node behind a wall whose content is folded onto this one; the node itself where there is none."""
     behind = node
-    if node == FIRST + 1 and lower_kind != FRICTION and lower_kind != PERIODIC:
+    if node == FIRST and lower_kind != PERIODIC:
         behind = FIRST - 1
-    if node == FIRST + cells - 1 and upper_kind != FRICTION and upper_kind != PERIODIC:
-        behind = FIRST + cells + 1
+    if node == FIRST + cells - 1 and upper_kind != PERIODIC:
+        behind = FIRST + cells
     return behind
 
 
 @wp.func
 def flipped(v: wp.vec4, axis: int, kind: int):
-    """A momentum or velocity seen in a wall: slip mirrors the normal component, stick turns all of them round."""
+    """A momentum or velocity seen in a wall: no-slip walls turn all of it round, others the component across."""
     out = v
     if kind == STICK:
         out = wp.vec4(-v[0], -v[1], -v[2], v[3])
@@ -95,44 +101,13 @@ def wall_kind(node: int, lower_kind: int, upper_kind: int, cells: int):
 
 
 @wp.func
-def sticks(grid: Grid, node: wp.vec3i, axis: int):
-    """Whether the wall nearest to a node on this axis is a no-slip wall."""
-    return wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis]) == STICK
-
-
-@wp.func
-def wall_friction(v: wp.vec3, axis: int, outward: float, friction: float):
-    """Unilateral contact with Coulomb friction: no motion into the wall, tangential loss up to friction times that."""
-    out = v
-    into = outward * v[axis]
-    if into > 0.0:
-        out[axis] = 0.0
-        slide = wp.length(out)
-        out = out * (1.0 - wp.min(friction * into / wp.max(slide, 1.0e-12), 1.0))
-    return out
-
-
-@wp.func
-def wall_velocity(grid: Grid, node: wp.vec3i, touching: wp.vec3i, v: wp.vec3):
-    """Impose the walls on the velocity of a node on, or behind, them."""
+def seen(grid: Grid, node: wp.vec3i, inside: wp.vec3i, v: wp.vec4):
+    """What a node shows that is the image of the node `inside`, which has v."""
     out = v
     for axis in range(3):
-        i, last = node[axis], FIRST + grid.cells[axis]
-        lower, upper = grid.lower_kind[axis], grid.upper_kind[axis]
-        if touching[axis] == 1 and (i <= FIRST or i >= last):
-            kind = lower
-            friction = grid.lower_friction[axis]
-            outward = float(-1.0)
-            if i >= last:
-                kind = upper
-                friction = grid.upper_friction[axis]
-                outward = 1.0
-            if kind == STICK:
-                out = wp.vec3(0.0, 0.0, 0.0)
-            elif kind == FRICTION:
-                out = wall_friction(out, axis, outward, friction)
-            else:
-                out[axis] = 0.0
+        if inside[axis] != node[axis]:
+            kind = wall_kind(node[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
+            out = flipped(out, axis, kind)
     return out
 
 
@@ -140,11 +115,10 @@ def wall_velocity(grid: Grid, node: wp.vec3i, touching: wp.vec3i, v: wp.vec3):
 def folded(
     grid: Grid, world: int, node: wp.vec3i, touching: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)
 ):
-    """Momentum and mass of a node in front of mirroring walls, with what was scattered behind them folded back."""
+    """Momentum and mass of a node in front of the walls that act, with what was scattered behind them folded back."""
     total = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    other = wp.vec3i(0, 0, 0)
+    other = node
     for axis in range(3):
-        other[axis] = node[axis]
         if touching[axis] == 1:
             other[axis] = image(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
     for combination in range(8):
@@ -155,24 +129,71 @@ def folded(
                 valid = valid and other[axis] != node[axis]
                 at[axis] = other[axis]
         if valid:
-            value = raw_node(grid, world, at, table, raw)
-            for axis in range(3):
-                if ((combination >> axis) & 1) == 1:
-                    kind = wall_kind(at[axis], grid.lower_kind[axis], grid.upper_kind[axis], grid.cells[axis])
-                    value = flipped(value, axis, kind)
-            total += value
+            total += seen(grid, at, node, raw_node(grid, world, at, table, raw))
     return total
 
 
 @wp.func
-def near_wall(grid: Grid, node: wp.vec3i):
-    """Whether a node is within one cell of a wall, in front or behind."""
-    near = bool(False)
-    for axis in range(3):
-        walled = grid.lower_kind[axis] != PERIODIC
-        if walled and (node[axis] <= FIRST + 1 or node[axis] >= FIRST + grid.cells[axis] - 1):
-            near = True
-    return near
+def pressed(
+    grid: Grid,
+    world: int,
+    node: wp.vec3i,
+    touching: wp.vec3i,
+    axis: int,
+    kick: float,
+    table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4),
+):
+    """How fast matter in front of a friction wall would go into it if it were not there [m/s]: its momentum across and
+    that of what is behind, less what the mirrored motion leaves them, over their mass. Negative where it lifts off."""
+    others = touching
+    others[axis] = 0
+    ghost = node
+    ghost[axis] = image(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
+    front = folded(grid, world, node, others, table, raw)
+    behind = folded(grid, world, ghost, others, table, raw)
+    mass = wp.max(front[3] + behind[3], TINY)
+    across = (front[axis] - behind[axis]) / mass + kick
+    lost = (front[axis] + behind[axis]) / mass + kick - across * (front[3] - behind[3]) / mass
+    return wp.where(ghost[axis] < node[axis], -lost, lost)
+
+
+@wp.func
+def rubbed(v: wp.vec3, axis: int, into: float, friction: float):
+    """A velocity beside a friction wall that `into` is pressed against: its part along the wall is less by up to
+    friction times that (Coulomb)."""
+    across = v[axis]
+    along = v
+    along[axis] = 0.0
+    out = along * (1.0 - wp.min(friction * into / wp.max(wp.length(along), 1.0e-12), 1.0))
+    out[axis] = across
+    return out
+
+
+@wp.func
+def friction_of(grid: Grid, node: wp.vec3i, axis: int):
+    """Coulomb's coefficient of the wall nearest to a node on this axis; negative where it is of another kind."""
+    kind = grid.upper_kind[axis]
+    friction = grid.upper_friction[axis]
+    if 2 * (node[axis] - FIRST) < grid.cells[axis]:
+        kind = grid.lower_kind[axis]
+        friction = grid.lower_friction[axis]
+    if kind != FRICTION:
+        friction = -1.0
+    return friction
+
+
+@wp.func
+def near_wall(grid: Grid, node: wp.vec3i, axis: int):
+    """Whether a node is the first in front of a wall of this axis, or behind it."""
+    walled = grid.lower_kind[axis] != PERIODIC
+    return walled and (node[axis] <= FIRST or node[axis] >= FIRST + grid.cells[axis] - 1)
+
+
+@wp.func
+def near_any(grid: Grid, node: wp.vec3i):
+    """Whether a node is the first in front of a wall, or behind one."""
+    return near_wall(grid, node, 0) or near_wall(grid, node, 1) or near_wall(grid, node, 2)
 
 
 @wp.func
@@ -181,68 +202,64 @@ def in_reach(grid: Grid, node: wp.vec3i):
     reached = bool(True)
     for axis in range(3):
         walled = grid.lower_kind[axis] != PERIODIC
-        if walled and (node[axis] < FIRST - 1 or node[axis] > FIRST + grid.cells[axis] + 1):
+        if walled and (node[axis] < FIRST - 1 or node[axis] > FIRST + grid.cells[axis]):
             reached = False
     return reached
 
 
 @wp.func
-def plane_share(grid: Grid, node: wp.vec3i):
-    """What the mass of a node on a wall must be multiplied by: only half (a quarter, ...) of its cell is inside."""
-    share = float(1.0)
+def in_front(grid: Grid, node: wp.vec3i):
+    """The node in front of all walls whose image a node is; itself elsewhere."""
+    inside = node
     for axis in range(3):
-        walled = grid.lower_kind[axis] != PERIODIC
-        if walled and (node[axis] == FIRST or node[axis] == FIRST + grid.cells[axis]):
-            share *= 2.0
-    return share
+        inside[axis] = mirror(node[axis], grid.cells[axis], grid.lower_kind[axis], grid.upper_kind[axis])
+    return inside
 
 
 @wp.func
-def beside(
+def facing(grid: Grid, node: wp.vec3i, touching: wp.vec3i):
+    """The node in front of the walls that act whose image a node is; itself elsewhere."""
+    inside = in_front(grid, node)
+    for axis in range(3):
+        if touching[axis] == 0:
+            inside[axis] = node[axis]
+    return inside
+
+
+@wp.func
+def touched(
     grid: Grid,
     world: int,
     node: wp.vec3i,
-    inside: wp.vec3i,
-    touching: wp.vec3i,
     kick: wp.vec3,
-    result: wp.vec4,
     table: wp.array(dtype=int),
     raw: wp.array(dtype=wp.vec4),
 ):
-    """Velocities of a node, those across no-slip walls put right.
-
-    Where matter sticks it cannot be squeezed out along a wall, so it comes no nearer: both u and du/dz are zero there,
-    u = 4/3 U z^2 in the nearest half cell. The node on the wall has -U/3, its neighbours on both sides U, momentum and
-    mass of all three are gathered in that proportion. A mirror (-U, 0, U) lets matter down on the floor, where its
-    volume ratio does not see it crowd.
-    """
-    out = result
+    """(per axis 1 where a wall acts on a node; how far they act, from 0 to 1; how fast friction walls are pressed
+    against [m/s]). `kick` is what forces add to velocities in this step."""
+    touching = wp.vec3i(0, 0, 0)
+    hold = float(1.0)
     for axis in range(3):
-        wall, step = int(FIRST), int(1)
-        if 2 * (node[axis] - FIRST) >= grid.cells[axis]:
-            wall = FIRST + grid.cells[axis]
-            step = -1
-        others = touching
-        others[axis] = 0
-        held, turned = bool(False), float(1.0)  # on another no-slip wall; behind one
-        for other in range(3):
-            if others[other] == 1 and sticks(grid, node, other):
-                held = held or inside[other] == FIRST or inside[other] == FIRST + grid.cells[other]
-                if inside[other] != node[other]:
-                    turned = -turned
-        if touching[axis] == 1 and sticks(grid, node, axis) and not held:
-            place = inside
-            place[axis] = wall
-            on = folded(grid, world, place, others, table, raw)
-            place[axis] = wall + step
-            near = folded(grid, world, place, others, table, raw)
-            place[axis] = wall - step
-            near += folded(grid, world, place, others, table, raw)
-            u = float(0.0)
-            if near[3] > 0.0:
-                mass = wp.max(near[3] - on[3] / 3.0, THIN * near[3])
-                u = turned * ((near[axis] - on[axis] / 3.0) / mass + kick[axis])
-            out[axis] = wp.where(node[axis] == wall, -u / 3.0, u)
+        held = grip(grid, world, node, axis, table, raw)
+        if near_wall(grid, node, axis) and held > 0.0:
+            hold = wp.min(hold, held)
+            touching[axis] = 1
+    into = wp.vec3(0.0, 0.0, 0.0)
+    for axis in range(3):
+        if touching[axis] == 1 and friction_of(grid, node, axis) >= 0.0:
+            into[axis] = pressed(grid, world, facing(grid, node, touching), touching, axis, kick[axis], table, raw)
+            if into[axis] <= 0.0:
+                touching[axis] = 0
+    return touching, hold, into
+
+
+@wp.func
+def rubbed_by_walls(grid: Grid, node: wp.vec3i, into: wp.vec3, v: wp.vec3):
+    """A node's velocity after the friction walls that it is pressed against."""
+    out = v
+    for axis in range(3):
+        if into[axis] > 0.0:
+            out = rubbed(out, axis, into[axis], friction_of(grid, node, axis))
     return out
 
 

@@ -224,3 +224,26 @@ def test_foam_that_rises_holds_on_to_its_floor(method):
     assert np.mean(top) == pytest.approx(float(rising_layer.drift(np.array(15 / 16))), rel=0.15)
     height = 2.0 * float(np.average(found[-1]["position"][:, 2], weights=found[-1]["mass"]))
     assert height == pytest.approx(float(rising_layer.height(np.array(brief.duration))), rel=0.02)
+
+
+@pytest.mark.parametrize(("load", "slow", "fast"), [(0.9, 0.0, 3e-4), (1.1, 2e-3, 1.0)])
+@pytest.mark.parametrize("ratio", [1.5, 2.0])
+def test_a_layer_two_cells_thick_yields_at_its_foot_when_its_weight_says_so(ratio, load, slow, fast):
+    """Paste four particles thick on a no-slip floor, out of order, drawn along with `load` times its yield stress over
+    its height: it rests or flows. Where the floor's nodes carried half a cell of it that did not pull, it rested up to
+    a load of 1.25 and 1.33."""
+    height, stress = 0.04, 100.0
+    periodic = {f"{axis}_{end}": "periodic" for axis in "xy" for end in ("lower", "upper")}
+    layer = define(
+        "layer",
+        domain={"lower": [0, 0, 0], "upper": [0.08, 0.08, 0.12], "walls": {"z_lower": "stick", **periodic}},
+        material={"density": 1000.0, "youngs_modulus": 1e5, "yield_stress": stress},
+        bodies=[{"kind": "box", "center": [0.04, 0.04, height / 2], "size": [0.08, 0.08, height]}],
+        gravity=[load * stress / (1000.0 * height), 0.0, -3.0],
+        duration=0.4,
+        output_interval=0.1,
+        spacing=0.01,
+        jitter=0.2,
+        numerics={"mpm": {"grid_ratio": ratio}},
+    )
+    assert slow <= frames(layer)[-1]["velocity"][:, 0].mean() <= fast

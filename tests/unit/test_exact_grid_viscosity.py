@@ -13,6 +13,7 @@ from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.numerics import configure
+from fluidbench.study.points import varied
 from solvers.mpm import particle
 from solvers.mpm.grid import Grid
 
@@ -250,15 +251,16 @@ def inertia_of(
     ("held", "height", "drags", "weight"),
     [
         (FREE, 9.0, 0, 1.0),
+        (CARRIED, 9.0, 0, 1.0),
         (CARRIED, 9.0, 1, 1.0),
-        (CARRIED, 5.0 + 1.4 * 2.0, 0, 1.0),
-        (CARRIED, 5.0 + 1.6 * 2.0, 0, 1e4),
-        (CARRIED, 20.0 - 1.6 * 2.0, 0, 1e4),
-        (CARRIED, 20.0 - 1.4 * 2.0, 0, 1.0),
+        (CARRIED, 5.0 + 1.4 * 2.0, 2, 1.0),
+        (CARRIED, 5.0 + 1.6 * 2.0, 2, 1e4),
+        (CARRIED, 20.0 - 1.6 * 2.0, 2, 1e4),
+        (CARRIED, 20.0 - 1.4 * 2.0, 2, 1.0),
         (CLAMPED, 0.0, 1, 1e4),
     ],
 )
-def test_the_piston_yields_to_nothing_where_viscosity_is_solved_for(held, height, drags, weight):
+def test_what_is_carried_yields_to_nothing_beside_a_body(held, height, drags, weight):
     """The exit at 5 m, a ceiling at 20 m, cells of 2 m."""
     grid = block(made(1.0, height=20.0)).solver.grid
     row, exit_ = wp.array([1], dtype=int), wp.array([[0, 0, 0], [0, 0, 5.0]], dtype=wp.vec3)
@@ -267,10 +269,13 @@ def test_the_piston_yields_to_nothing_where_viscosity_is_solved_for(held, height
     assert grid.dx[2] == 2.0 and found.numpy()[0] == pytest.approx(3.0 * weight)
 
 
-def test_a_viscous_strand_holds_together_and_keeps_its_volume():
+@pytest.mark.parametrize("standoff", [0.009, 0.01, 0.011])
+def test_a_viscous_strand_holds_together_and_keeps_its_volume(standoff):
     """Fed at a stress far beyond its weight: without tension it swells by a third, and by 8 % at the sound speed that
-    gravity alone would ask for."""
+    gravity alone would ask for. Where the piston was a heavy column of what is carried its end burst, by up to a
+    quarter of the volume, by how far the exit lay from the nodes."""
     scenario = bead(material={"density": 1400.0, "viscosity": 300.0}, duration=0.1)
+    scenario = varied(scenario.model_dump(mode="json"), {"nozzle.standoff": standoff})
     assert scenario.liquid_sound_speed > 2.0 * 10.0 * scenario.reference_speed
     simulation = block(scenario, tolerance=1e-4)
     while simulation.now < 0.1:

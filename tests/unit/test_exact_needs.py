@@ -37,9 +37,9 @@ def test_a_run_needs_a_process_and_its_particles(monkeypatch, free, fits):
 
 
 def test_mpm_needs_its_particles_and_an_index_of_every_block():
-    """10 cells of 0.02 m and 20 of 0.01 m along 0.2 m, and nodes behind the walls: 6 and 8 blocks; 1128 along 90 m."""
+    """10 cells of 0.02 m and 20 of 0.01 m along 0.2 m, and nodes behind the walls: 4 and 7 blocks; 1127 along 90 m."""
     mpm, s = get_method("mpm"), scenario()
-    for ratio, edge in ((2.0, 6), (1.0, 8)):
+    for ratio, edge in ((2.0, 4), (1.0, 7)):
         assert mpm.refuses(s, mpm.Config(grid_ratio=ratio)) is None
         assert mpm.memory(s, mpm.Config(grid_ratio=ratio), 100) == 100 * mpm.typical_bytes + 4 * edge**3
         implicit = mpm.Config(grid_ratio=ratio, viscosity="implicit")  # half a block of 64 nodes of 5 vec4 a particle
@@ -47,7 +47,7 @@ def test_mpm_needs_its_particles_and_an_index_of_every_block():
         assert Simulation(s, mpm, config=mpm.Config(grid_ratio=ratio)).solver.table.size == edge**3
     vast = scenario(domain={"lower": [0.0] * 3, "upper": [90.0] * 3})
     assert mpm.refuses(vast, mpm.Config()) == (
-        "the domain holds 1.44e+09 grid blocks; use a smaller domain or a larger spacing"
+        "the domain holds 1.43e+09 grid blocks; use a smaller domain or a larger spacing"
     )
 
 

@@ -20,10 +20,11 @@ def ask(piston: Piston, grid: Grid, places: wp.array(dtype=wp.vec3), velocity: w
     found[i] = driven(piston, grid, places[i], velocity)
 
 
-def answers(places, velocity, feeding=0.5):
+def answers(places, velocity, feeding=0.5, firm=0, still=0):
     """Of nodes that would move at `velocity`, about a nozzle of radius 0.1 at (1, 2, 3) that goes at (4, 5, 0.2)."""
     piston, grid = Piston(), Grid()
     piston.on, piston.bore, piston.speed = 1, 0.01, 1.0
+    piston.firm, piston.still = firm, still
     piston.row, piston.feeding = wp.array([2], dtype=int), wp.array([9.0, feeding, 9.0], dtype=float)
     nowhere = [9.0] * 3
     piston.exit = wp.array([nowhere, nowhere, [1, 2, 3]], dtype=wp.vec3)
@@ -47,6 +48,12 @@ def test_what_flows_away_faster_is_not_held_back():
     assert answers(INSIDE, (7, 8, -0.5)) == pytest.approx(np.tile([4, 5, -0.5], (3, 1)))
 
 
+def test_where_viscosity_is_solved_for_what_is_faster_is_held_and_nothing_yields():
+    assert answers(INSIDE, (7, 8, -0.5), firm=1) == pytest.approx(np.tile([4, 5, DOWN], (3, 1)))
+    assert answers(INSIDE, (7, 8, 9), still=1) == pytest.approx(0.0)
+    assert answers(OUTSIDE, (7, 8, 9), firm=1, still=1) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
+
+
 def test_a_nozzle_that_does_not_extrude_drives_nothing():
     assert answers(INSIDE, (7, 8, 9), feeding=0.0) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
 
@@ -62,7 +69,7 @@ DROP = {"bodies": [{"kind": "sphere", "center": [0.05] * 3, "radius": 0.02}], "m
     [
         (1, {"material": PASTE, "nozzle": NOZZLE}),
         (1, {"material": SYRUP, "nozzle": NOZZLE}),
-        (0, {"material": SYRUP, "nozzle": NOZZLE, "numerics": {"mpm": {"viscosity": "implicit"}}}),
+        (1, {"material": SYRUP, "nozzle": NOZZLE, "numerics": {"mpm": {"viscosity": "implicit"}}}),
         (0, {"material": SYRUP, "nozzle": NOZZLE | {"tip": "flat"}}),
         (0, {"material": PASTE, "nozzle": NOZZLE | {"profile": "developed"}}),
         (0, DROP),
@@ -70,8 +77,8 @@ DROP = {"bodies": [{"kind": "sphere", "center": [0.05] * 3, "radius": 0.02}], "m
     ids=["paste", "liquid", "implicit", "body", "developed", "drop"],
 )
 def test_it_acts_where_nothing_else_pushes(on, table):
-    """Beside a rigid body and with implicit viscosity what is carried passes its push on by itself; where a profile has
-    developed nothing goes as a plug."""
+    """Beside a rigid body what is carried passes its push on by itself; where a profile has developed nothing goes as a
+    plug."""
     path = {"toolpath": {"kind": "line", "start": [0.04, 0.05], "end": [0.06, 0.05], "speed": 0.02}}
     scenario = define(
         "piston",
