@@ -68,6 +68,10 @@ CASE = Case(
     fine_tolerance=0.02,
     scenarios=scenarios,
     evaluate=evaluate,
+    causes={
+        "mpm": "3 to 5 % too stiff, by where the beam lies between nodes (0.032 to 0.052 in eight places): what is "
+        "clamped holds the nodes that it shares with the beam",
+    },
     exempt={
         "pbd": "12 % too soft, 5 % at two thirds and 2.6 % at half the spacing: as SPH's, on a free face",
         "sph": "a tenth too soft, 2 % at half the spacing: strain on a free face is seen 0.3 d further in, of 8 d",

@@ -104,8 +104,4 @@ CASE = Case(
     tolerance=0.1,
     scenarios=scenarios,
     evaluate=evaluate,
-    causes={
-        "mpm": "right at 1 s (0.005); then the floor's grip lets go of rows that are 0.7 cells away from it, and the "
-        "layer slides off: at a grid ratio of 1.5 from 0.8 s on, and the run is stopped",
-    },
 )

@@ -56,7 +56,4 @@ CASE = Case(
     tolerance=0.08,
     scenarios=scenarios,
     evaluate=evaluate,
-    causes={
-        "mpm": "a deposit five cells thick: 0.116 at H / 20, 0.088 at H / 30, 0.069 at H / 40",
-    },
 )

@@ -32,7 +32,6 @@ CHEAP = [
     ("self_weight_column", "mpm"),
     ("oldroyd_startup", "mpm"),
     ("dam_break", "mpm"),
-    ("cantilever_sag", "mpm"),
 ]
 ALL = [(name, method) for name, case in cases().items() for method in NATIVE if not case.skips(method)]
 
