@@ -59,10 +59,16 @@ class Clock:
 
     @property
     def bore(self) -> tuple[float, float]:
-        """Radius [m] of what feeds the stream as a plug, and its speed [m/s]; nothing where no piston does."""
-        if self.stream is None or self.stream.nozzle.develops:
+        """Radius of what feeds the stream, and how far it reaches down from where matter is let go [m]; nothing without
+        a stream."""
+        if self.stream is None:
             return 0.0, 0.0
-        return 0.5 * self.stream.nozzle.diameter, self.stream.nozzle.speed
+        return 0.5 * self.stream.nozzle.diameter, self.stream.nozzle.rise
+
+    def speed_at(self, radius: np.ndarray) -> np.ndarray:
+        """Of the stream at radii [m] from its axis, while it extrudes [m/s]."""
+        assert self.stream is not None
+        return self.stream.nozzle.speed * self.stream.pace_at(radius)
 
     @property
     def last_birth(self) -> float:

@@ -48,12 +48,12 @@ class Bore:
         return 4.0 * self.wall_stress * length / self.diameter
 
     def profile(self, radius: np.ndarray) -> np.ndarray:
-        """Speed over its mean at radii [m] from the axis [-]."""
+        """Speed over its mean at radii [m] from the axis [-]; beyond the wall as its formula goes on."""
         threshold = self._law[0]
         over = self.wall_stress - threshold
         if over <= PLASTIC * threshold or over <= 0.0:
             return np.ones_like(radius)
-        return self._speed(np.minimum(2.0 * radius / self.diameter, 1.0), over) / self.speed
+        return self._speed(2.0 * radius / self.diameter, over) / self.speed
 
     def _speed(self, share: np.ndarray, over: float) -> np.ndarray:
         """At r / R, for a stress at the wall that exceeds the yield stress by `over` [m/s]."""

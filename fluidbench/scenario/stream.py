@@ -57,7 +57,7 @@ class Stream:
     @cached_property
     def offsets(self) -> np.ndarray:
         """Points of one disc about the nozzle axis, shape (n, 2) [m]."""
-        fill = disc if self.nozzle.tip == "none" else rings
+        fill = rings if self.nozzle.develops or self.nozzle.tip != "none" else disc
         return fill(self.nozzle.diameter / 2.0, self.scenario.spacing)
 
     @property
@@ -79,11 +79,14 @@ class Stream:
     def paces(self) -> np.ndarray:
         """Speed over the mean, of each point of a disc where they differ; (1,) in a plug. Their mean is 1: the flow
         rate is exact."""
+        return self.pace_at(np.linalg.norm(self.offsets, axis=1)) if self.nozzle.develops else np.ones(1)
+
+    def pace_at(self, radius: np.ndarray) -> np.ndarray:
+        """Speed over the mean at radii [m] from the axis."""
         if not self.nozzle.develops:
-            return np.ones(1)
+            return np.ones_like(radius)
         bore = Bore(self.scenario.material, self.nozzle.diameter, self.nozzle.speed)
-        paces = bore.profile(np.linalg.norm(self.offsets, axis=1))
-        return paces / paces.mean()
+        return bore.profile(radius) / bore.profile(np.linalg.norm(self.offsets, axis=1)).mean()
 
     @cached_property
     def _rows(self) -> tuple[np.ndarray, np.ndarray]:

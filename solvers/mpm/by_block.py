@@ -45,7 +45,7 @@ class ByBlock:
         raw: wp.array,
     ) -> None:
         """Find homes anew where particles have moved to others; then scatter, and add up."""
-        pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
+        pool, scene = self.pool, self.scene
         wp.capture_if(self.homes.outdated, on_true=lambda: self._enrol(grid, table))
         self.launch(
             scatter,
@@ -65,8 +65,6 @@ class ByBlock:
                 pool.volume,
                 pool.phase,
                 pool.held,
-                hours.row,
-                hours.exit,
             ],
             self.strains,
         )

@@ -52,7 +52,7 @@ from .grid_taichi import (
     wrapped,
 )
 from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
-from .piston import BELOW, Piston
+from .piston import BELOW, FINE, WIDE, Piston
 
 spline = taichi_func(quadratic_spline)
 PistonT = struct_of(Piston)
@@ -208,8 +208,6 @@ def passes(alone: bool) -> SimpleNamespace:
         volume: Floats,
         phase_of: Ints,
         held: Ints,
-        row: Ints,
-        exit: Vectors,
         table: Ints,
         volume_ratio: Floats,
         elastic_normal: Vectors,
@@ -269,6 +267,7 @@ def passes(alone: bool) -> SimpleNamespace:
         dt: Floats,
         force: Forces,
         piston: PistonT,
+        speed: Floats,
         row: Ints,
         exit: Vectors,
         drift: Vectors,
@@ -296,10 +295,13 @@ def passes(alone: bool) -> SimpleNamespace:
                     if piston.on == 1:
                         before = ti.max(row[0] - 1, 0)
                         away = place - exit[row[0]]
-                        within = away[0] ** 2 + away[1] ** 2 < piston.bore and away[2] > -BELOW * grid.dx[2]
-                        if within and feeding[before] > 0.0:
+                        square = (away[0] ** 2 + away[1] ** 2) / piston.bore**2
+                        if square < 1.0 and away[2] > -BELOW * grid.dx[2] and feeding[before] > 0.0:
                             going = drift[before]
-                            down = going[2] - feeding[before] * piston.speed
+                            part = FINE / WIDE**2 * square
+                            low = ti.cast(part, ti.i32)
+                            flow = speed[low] + (part - low) * (speed[low + 1] - speed[low])
+                            down = going[2] - feeding[before] * flow
                             if piston.firm == 0:
                                 down = ti.min(v[2], down)
                             v = (1 - piston.still) * vec3(going[0], going[1], down)

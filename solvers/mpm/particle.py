@@ -22,9 +22,7 @@ IMPLICIT, EXPLICIT, PRESSED = wp.constant(0), wp.constant(1), wp.constant(2)
 # they share: a beam falls slowly off it.
 ANCHOR = wp.constant(1.0e4)
 STEEPEST = wp.constant(1.0 / 6.0)  # D dt / dx^2 up to which explicit diffusion is stable in three dimensions
-# Crowding on the grid that only clamps can make [-]; that only the feed beside a rigid body can, which at some height
-# over the nodes makes any, and would shift what it lets go all the time.
-ANCHORED, DRIVEN = wp.constant(10.0), wp.constant(1.5)
+ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
 PACKED = wp.constant(2.0)  # volume ratio, or one over it, beyond which nothing is let go [-]
 
 
@@ -90,27 +88,9 @@ def weights(grid: Grid, x: wp.vec3, base: wp.vec3i):
 
 
 @wp.func
-def inertia(
-    grid: Grid,
-    mass: float,
-    held: int,
-    x: wp.vec3,
-    drags: int,
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
-):
-    """With which a particle takes part in the momentum of its nodes [kg].
-
-    Where there is no rigid body the grid is pushed as piston.py says. Beside one, what is carried is as heavy as a
-    clamp as far above the exit as nodes reach, and yields to nothing; what is carried below that passes its push on by
-    the pressure and viscosity of a liquid.
-    (Not beneath a ceiling whose nodes it would share: these do not move.)
-    """
-    heavy = held == CLAMPED
-    if held == CARRIED and drags == PRESSED:
-        reach = 1.5 * grid.dx[2]
-        heavy = x[2] > exit[row[0]][2] + reach and x[2] < grid.upper[2] - reach
-    return wp.where(heavy, ANCHOR * mass, mass)
+def inertia(mass: float, held: int):
+    """With which a particle takes part in the momentum of its nodes [kg]."""
+    return wp.where(held == CLAMPED, ANCHOR * mass, mass)
 
 
 @wp.func
@@ -224,7 +204,6 @@ def shifted(
     sums: wp.mat44,
     c: wp.mat33,
     step: float,
-    pitch: float,
     volume_ratio: float,
     held: int,
 ):
@@ -232,14 +211,11 @@ def shifted(
 
     Matter that is stretched beyond the width of a cell leaves gaps between its particles that no stress holds open,
     and its volume is lost. Shifting fills them (Fick's law, Lind et al. 2012), in proportion to the strain that makes
-    them: what rests, flies or turns is left alone. `pitch` is 0 beside a rigid body.
+    them: what rests, flies or turns is left alone.
     """
     by = wp.vec3(0.0, 0.0, 0.0)
     crowding = sums[0, 3] * volume_ratio / phase.density
-    most = float(ANCHORED)
-    if pitch <= 0.0:
-        most = float(DRIVEN)
-    if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < most:
+    if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
         # 4 sum w rho (x_i - x) is dx^2 grad(rho)
         by = -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / phase.density) * wp.cw_mul(
             wp.vec3(sums[1, 3], sums[2, 3], sums[3, 3]), grid.dx

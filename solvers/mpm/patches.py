@@ -140,8 +140,6 @@ def scatter(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
     # outputs
     volume_ratio: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
@@ -157,7 +155,7 @@ def scatter(
             p = homes.members[member]
             world = p / capacity
             phase = phases[world, phase_of[p]]
-            m = inertia(grid, mass[p], held[p], position[p], drags, row, exit)
+            m = inertia(mass[p], held[p])
             a = stressed(
                 grid,
                 dt[world],
@@ -257,9 +255,7 @@ def gather(
             c = affine_of(grid, sums)
             affine[p] = c
             v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
-            x += shifted(
-                grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], pitch, volume_ratio[p], held[p]
-            )
+            x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
             after = moved(grid, x, v, dt[world], p, position, velocity, fault)
             if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
                 activate_stencil(grid, world, after, table, block_of, active, fault)

@@ -3,15 +3,18 @@
 What is carried gives its nodes its momentum anew in every step, with no more than its own mass: that is a force
 m (U - u) / dt, to which matter of stress sigma yields by U - u = sigma dt / (rho d). A stiff mortar held the grid at a
 quarter to a half of the piston's speed so, between bursts. So the nodes within the bore, from the first row at the
-exit upwards, move with the piston: no slower down, for what flows away faster is not held back, and sideways with the
-bore. Only while it extrudes: what lifts does not pull at what it has laid. And only of a plug: where a profile has
-developed, matter at the rim hardly moves. Where viscosity is solved for, the piston is firm: its nodes move at its
-speed, not faster either (which would make of it another equation with every velocity), and whatever pushes at them
-changes nothing.
+exit upwards, move with the piston: with the profile that its flow has developed, sideways with the bore, and no slower
+down, for what flows away faster is not held back. Only while it extrudes: what lifts does not pull at what it has laid.
+
+The piston is firm, its nodes move at its speed and not faster either, where viscosity is solved for (which faster nodes
+would make another equation with every velocity; whatever pushes at them changes nothing), and in the bore of a body:
+there it is on when nothing is extruded, too, and holds what is below it.
 """
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from fluidbench.native.scene import Scene
@@ -23,6 +26,8 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 # How far below the exit the first row of nodes may lie, in cells. What is pressed from farther below comes out wider;
 # where the first row lies more than the rest of a cell above it, the piston holds as little as none would.
 BELOW = wp.constant(0.3)
+WIDE = wp.constant(2.0)  # how far the flow is tabled, as nodes in the wall of a body ask for it [radii of the bore]
+FINE = wp.constant(256)  # parts of the square of that, between which speeds are linear, as a parabola is
 
 
 @wp.struct
@@ -32,24 +37,47 @@ class Piston:
     on: int
     firm: int  # 1 where what is faster is held back, too
     still: int  # 1 where it is asked by how much its nodes yield to what pushes: not at all
-    bore: float  # radius squared [m^2]
-    speed: float  # of what leaves it while it extrudes [m/s]
+    walled: int  # 1 where the bore is that of a body
+    bore: float  # radius [m]
+    rise: float  # of its upper end, where matter is let go, over the lower [m]
+    speed: wp.array(dtype=float)  # of nodes while it extrudes, at equal steps of the radius squared up to WIDE [m/s]
     row: wp.array(dtype=int)  # of the end of the tick that substeps are in
     exit: wp.array(dtype=wp.vec3)
     drift: wp.array(dtype=wp.vec3)
     feeding: wp.array(dtype=float)
 
 
-def piston_of(scene: Scene, acts: bool, firm: bool = False, still: bool = False) -> Any:
-    """The piston of a scene that is fed, if it `acts`."""
-    piston, hours = Piston(), scene.clock.hours
-    radius, speed = scene.clock.bore
+def piston_of(scene: Scene, dx: Sequence[float], firm: bool = False, still: bool = False) -> Any:
+    """The piston of a scene, if that is fed."""
+    piston, clock = Piston(), scene.clock
     for name in ("row", "exit", "drift", "feeding"):
-        setattr(piston, name, getattr(hours, name))
-    piston.firm, piston.still = int(firm), int(still)
-    if acts and radius > 0.0:
-        piston.on, piston.bore, piston.speed = 1, radius * radius, speed
+        setattr(piston, name, getattr(clock.hours, name))
+    piston.firm, piston.still, piston.walled = int(firm), int(still), int(scene.outline is not None)
+    piston.bore, piston.rise = clock.bore
+    speed = np.zeros(1)
+    if clock.stream is not None:
+        piston.on = 1
+        speed = sharpened(clock.speed_at, piston.bore, 0.5 * (dx[0] ** 2 + dx[1] ** 2))
+    piston.speed = wp.array(speed.astype(np.float32), device=scene.device)
     return piston
+
+
+def sharpened(profile: Callable[[np.ndarray], np.ndarray], radius: float, square: float) -> np.ndarray:
+    """Speeds of nodes, of cells of so many square metres, from which particles gather a profile of the distance from
+    the axis: splines add dx^2 / 8 times its Laplacian to what they smooth, by s = r^2 that is 4 u' + 4 s u''. At equal
+    steps of s, shape (FINE + 1,)."""
+    s = (WIDE * radius) ** 2 * np.linspace(0.0, 1.0, FINE + 1)
+    u = profile(np.sqrt(s))
+    slope = np.gradient(u, s)
+    return u - 0.5 * square * (slope + s * np.gradient(slope, s))
+
+
+@wp.func
+def speed_of(piston: Piston, share: float):
+    """Of nodes at a share r/R of the bore's radius [m/s]."""
+    at = wp.min(share * share / (WIDE * WIDE), 1.0) * float(FINE)
+    low = wp.min(int(at), FINE - 1)
+    return piston.speed[low] + (at - float(low)) * (piston.speed[low + 1] - piston.speed[low])
 
 
 @wp.func
@@ -60,9 +88,10 @@ def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
     before = wp.max(row - 1, 0)
     feeding = piston.feeding[before]
     away = x - piston.exit[row]
-    if feeding > 0.0 and away[2] > -BELOW * grid.dx[2] and away[0] * away[0] + away[1] * away[1] < piston.bore:
+    share = wp.length(wp.vec2(away[0], away[1])) / piston.bore
+    if (feeding > 0.0 or piston.walled == 1) and away[2] > -BELOW * grid.dx[2] and (share < 1.0 or piston.walled == 1):
         out = piston.drift[before]
-        out[2] -= feeding * piston.speed
+        out[2] -= feeding * speed_of(piston, share)
         if piston.firm == 0:
             out[2] = wp.min(v[2], out[2])
         if piston.still == 1:

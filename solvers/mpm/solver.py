@@ -142,8 +142,8 @@ class SolverMPM(Solver):
         apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
         self.arranges = EVERY if apart else 0
-        self.piston = piston_of(scene, self.held is None, firm=implicit)
-        self.unmoved = piston_of(scene, self.held is None, still=True)
+        self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
+        self.unmoved = piston_of(scene, self.grid.dx, still=True)
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
@@ -231,7 +231,6 @@ class SolverMPM(Solver):
     def give(self, dt: wp.array, drags: int, raw: wp.array) -> None:
         """The same, of particles themselves."""
         pool, scene = self.pool, self.scene
-        hours = scene.clock.hours
         if self.by_block is not None:
             self.by_block.p2g(self.grid, self.table, self.block_of, self.active, dt, drags, raw)
             return
@@ -252,8 +251,6 @@ class SolverMPM(Solver):
                 pool.volume,
                 pool.phase,
                 pool.held,
-                hours.row,
-                hours.exit,
                 self.table,
             ],
             [*self.strains, raw, pool.fault],
@@ -290,7 +287,7 @@ class SolverMPM(Solver):
             homes = None if self.by_block is None else self.by_block.homes
             self.held.keep_out(self.table, self.block_of, self.active, homes)
             self.empty(self.held.nodes)
-            self.held.level(self.table)
+            self.held.level(self.table, self.piston, self.moving)
 
     def gather(self) -> None:
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours

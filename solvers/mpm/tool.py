@@ -11,9 +11,11 @@ What is gathered is that of nodes in front, not the transpose of what was scatte
 1.03, and a pressure makes energy. (The transpose would turn stress along the surface round, which pushes matter about
 wherever it is curved, and let the last of the images expand into the void behind them.) Viscous stress damps the
 velocity. What it leaves shows in the volume ratios, which drift apart from particle to particle until pressures tear
-the flow up; so they diffuse, as densities do in SPH: J += dt DIFFUSION c / dx (<J> - J), <J> that of the nodes. Nothing
-like it holds a paste, whose stress drifts, too; viscosity that is solved for, of which images know nothing; or what
-slips. All three are refused (pressed.py).
+the flow up; so they diffuse, as densities do in SPH: J += dt DIFFUSION c / dx (<J> - J), <J> that of the nodes. What
+they drift by together stays: along a bore matter came to be packed by up to a quarter more than its J told. A bore has
+no free surface, and matter shares its space: there <J> is the share. Nothing like it holds a paste, whose stress
+drifts, too; viscosity that is solved for, of which images know nothing; or what slips. All three are refused
+(pressed.py).
 """
 
 from typing import Any
@@ -27,12 +29,14 @@ from fluidbench.native.scene import Phase, Scene
 
 from ..tool import Tool, mirrored, outside, table_of, tool_of
 from .grid import Grid, first_node, node_at
-from .nodes import follow, mean_of_nodes, tell_nodes
-from .particle import PRESSED, columns_scaled, inertia, kirchhoff, resistance_of, viscous, weights
+from .nodes import follow, mean_of_nodes, room_of, tell_nodes
+from .particle import columns_scaled, inertia, kirchhoff, resistance_of, viscous, weights
+from .piston import Piston
 
 wp.set_module_options({"enable_backward": False})
 
 REACH = 2.5  # of images [cells]: nodes behind the surface that particles in front of it read are then complete
+REACHED = wp.constant(1.5)  # by the nodes of a particle [cells]
 DIFFUSION = wp.constant(0.1)  # of J, over c dx; of densities: Antuono et al. 2010, Comput. Phys. Commun. 181:532
 
 
@@ -53,8 +57,6 @@ def reflect(
     mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     volume_ratio: wp.array(dtype=float),
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
     table: wp.array(dtype=int),
     # outputs
     raw: wp.array(dtype=wp.vec4),
@@ -66,7 +68,7 @@ def reflect(
         x, fill, normal = mirrored(tool, position[p], reach)
         if fill > 0.0:
             phase = phases[world, phase_of[p]]
-            m = fill * inertia(grid, mass[p], held[p], position[p], PRESSED, row, exit)
+            m = fill * inertia(mass[p], held[p])
             turned = affine[p] - 2.0 * wp.outer(affine[p] * normal, normal)
             v = 2.0 * tool.pose.velocity[0] - velocity[p]
             a = wp.mat33()
@@ -145,16 +147,26 @@ def level(
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
+    held: wp.array(dtype=int),
+    piston: Piston,
     table: wp.array(dtype=int),
     nodes: wp.array(dtype=wp.vec4),
+    moving: wp.array(dtype=wp.vec4),
     # outputs
     volume_ratio: wp.array(dtype=float),
 ):
-    """Volume ratios diffuse towards those of the nodes."""
+    """Volume ratios diffuse towards those of the nodes; within the bore
+    towards the space that there is."""
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
         mean = mean_of_nodes(grid, world, position[p], False, table, nodes)[0]
+        away = position[p] - piston.exit[piston.row[0]]
+        within = away[0] * away[0] + away[1] * away[1] < piston.bore * piston.bore
+        if held[p] == FREE and within and away[2] + piston.rise > REACHED * grid.dx[2]:
+            mean = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
         part = DIFFUSION * dt[world] * phases[world, phase_of[p]].wave_speed * grid.inv_dx[0]
         volume_ratio[p] = volume_ratio[p] + wp.min(part, 1.0) * (mean - volume_ratio[p])
 
@@ -176,8 +188,7 @@ class Held:
         pool, launch = self.pool, self.scene.crew.launch
         matter = [pool.phase, pool.held, pool.position, pool.velocity, pool.affine, pool.mass, pool.volume]
         body = [self.grid, self.tool, self.reach, pool.capacity, pool.count, dt, self.scene.phases]
-        hours = self.scene.clock.hours
-        launch(reflect, pool.size, [*body, *matter, pool.volume_ratio, hours.row, hours.exit, table], [raw])
+        launch(reflect, pool.size, [*body, *matter, pool.volume_ratio, table], [raw])
 
     def keep_out(self, table: wp.array, block_of: wp.array, active: wp.array, homes: Any) -> None:
         pool, outdated = self.pool, self._nobody if homes is None else homes.outdated
@@ -188,14 +199,15 @@ class Held:
             [pool.position, table, block_of, active, outdated, pool.fault],
         )
 
-    def level(self, table: wp.array) -> None:
+    def level(self, table: wp.array, piston: Any, moving: wp.array) -> None:
         """Enqueue: volume ratios diffuse, by way of `nodes`, which are empty."""
         pool, scene = self.pool, self.scene
         matter = [self.grid, pool.capacity, pool.count]
         scene.crew.launch(
             spread, pool.size, [*matter, pool.position, pool.volume, pool.volume_ratio, table], [self.nodes]
         )
-        inputs = [*matter, scene.dt, scene.phases, pool.phase, pool.position, table, self.nodes]
+        inputs = [*matter, scene.dt, scene.phases, pool.phase, pool.position, pool.mass, pool.volume, pool.held]
+        inputs += [piston, table, self.nodes, moving]
         scene.crew.launch(level, pool.size, inputs, [pool.volume_ratio])
 
     def footprint(self) -> dict[str, int]:

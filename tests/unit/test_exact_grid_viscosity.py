@@ -8,14 +8,11 @@ import pytest
 import warp as wp
 
 from fluidbench.errors import UserError
-from fluidbench.method.frame import CARRIED, CLAMPED, FREE
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.numerics import configure
 from fluidbench.study.points import varied
-from solvers.mpm import particle
-from solvers.mpm.grid import Grid
 
 from ..conftest import bead
 from .test_exact_viscosity import PERIODIC, SIDE, SLIPPERY, STUCK, adrift, made, noise
@@ -232,41 +229,6 @@ def test_auto_takes_what_the_bounds_call_cheaper_but_never_beside_rough_walls():
     assert "friction" in (MPM.refuses(rough, forced) or "") and MPM.refuses(made(1e7), forced) is None
     with pytest.raises(UserError, match="friction"):
         Simulation(rough, "mpm", Target(), forced)
-
-
-@wp.kernel
-def inertia_of(
-    grid: Grid,
-    held: int,
-    x: wp.vec3,
-    drags: int,
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
-    found: wp.array(dtype=float),
-):
-    found[0] = particle.inertia(grid, 3.0, held, x, drags, row, exit)
-
-
-@pytest.mark.parametrize(
-    ("held", "height", "drags", "weight"),
-    [
-        (FREE, 9.0, 0, 1.0),
-        (CARRIED, 9.0, 0, 1.0),
-        (CARRIED, 9.0, 1, 1.0),
-        (CARRIED, 5.0 + 1.4 * 2.0, 2, 1.0),
-        (CARRIED, 5.0 + 1.6 * 2.0, 2, 1e4),
-        (CARRIED, 20.0 - 1.6 * 2.0, 2, 1e4),
-        (CARRIED, 20.0 - 1.4 * 2.0, 2, 1.0),
-        (CLAMPED, 0.0, 1, 1e4),
-    ],
-)
-def test_what_is_carried_yields_to_nothing_beside_a_body(held, height, drags, weight):
-    """The exit at 5 m, a ceiling at 20 m, cells of 2 m."""
-    grid = block(made(1.0, height=20.0)).solver.grid
-    row, exit_ = wp.array([1], dtype=int), wp.array([[0, 0, 0], [0, 0, 5.0]], dtype=wp.vec3)
-    found = wp.zeros(1, dtype=float)
-    wp.launch(inertia_of, 1, [grid, int(held), wp.vec3(0.0, 0.0, height), drags, row, exit_], [found])
-    assert grid.dx[2] == 2.0 and found.numpy()[0] == pytest.approx(3.0 * weight)
 
 
 @pytest.mark.parametrize("standoff", [0.009, 0.01, 0.011])

@@ -9,7 +9,8 @@ from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
 from fluidbench.scenario.library import define
 from solvers.mpm.grid import Grid
-from solvers.mpm.piston import Piston, driven
+from solvers.mpm.piston import Piston, driven, sharpened
+from solvers.smoothing import quadratic_spline
 
 DOWN = -0.3  # of the nozzle at 0.2 m/s upwards, extruding half of the time at 1 m/s
 
@@ -20,11 +21,20 @@ def ask(piston: Piston, grid: Grid, places: wp.array(dtype=wp.vec3), velocity: w
     found[i] = driven(piston, grid, places[i], velocity)
 
 
-def answers(places, velocity, feeding=0.5, firm=0, still=0):
+def plug(radius):
+    return np.ones_like(radius)
+
+
+def parabola(radius):
+    return 2.0 * (1.0 - (radius / 0.1) ** 2)
+
+
+def answers(places, velocity, feeding=0.5, firm=0, still=0, walled=0, profile=plug):
     """Of nodes that would move at `velocity`, about a nozzle of radius 0.1 at (1, 2, 3) that goes at (4, 5, 0.2)."""
     piston, grid = Piston(), Grid()
-    piston.on, piston.bore, piston.speed = 1, 0.01, 1.0
-    piston.firm, piston.still = firm, still
+    piston.on, piston.bore = 1, 0.1
+    piston.speed = wp.array(sharpened(profile, 0.1, 0.04**2).astype(np.float32))
+    piston.firm, piston.still, piston.walled = firm, still, walled
     piston.row, piston.feeding = wp.array([2], dtype=int), wp.array([9.0, feeding, 9.0], dtype=float)
     nowhere = [9.0] * 3
     piston.exit = wp.array([nowhere, nowhere, [1, 2, 3]], dtype=wp.vec3)
@@ -58,6 +68,30 @@ def test_a_nozzle_that_does_not_extrude_drives_nothing():
     assert answers(INSIDE, (7, 8, 9), feeding=0.0) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
 
 
+def test_in_the_bore_of_a_body_it_drives_the_wall_too_and_holds_when_nothing_is_extruded():
+    wall = [*INSIDE, *OUTSIDE[1:]]
+    assert answers(wall, (7, 8, -9), firm=1, walled=1) == pytest.approx(np.tile([4, 5, DOWN], (5, 1)))
+    assert answers(wall, (7, 8, 9), feeding=0.0, firm=1, walled=1) == pytest.approx(np.tile([4, 5, 0.2], (5, 1)))
+    below = answers(OUTSIDE[:1], (7, 8, 9), firm=1, walled=1)
+    assert below == pytest.approx(np.array([[7.0, 8.0, 9.0]]))
+
+
+def test_particles_gather_the_profile_from_what_it_gives_to_nodes():
+    """Of a parabola exactly, in the wall as before it: cells of 0.04 in a bore of radius 0.1."""
+    rng = np.random.default_rng(3)
+    x = rng.uniform(-0.07, 0.07, (40, 2))
+    base = np.floor(x / 0.04 - 0.5)
+    share = np.stack(np.vectorize(quadratic_spline)(x / 0.04 - base), axis=-1)  # (point, axis, node)
+    gathered = np.zeros(len(x))
+    for i in range(3):
+        for j in range(3):
+            node = 0.04 * (base + np.array([i, j]))
+            places = np.column_stack([node + np.array([1.0, 2.0]), np.full(len(x), 3.1)])
+            speed = 0.2 - answers(places, (0, 0, 0), feeding=1.0, firm=1, walled=1, profile=parabola)[:, 2]
+            gathered += share[:, 0, i] * share[:, 1, j] * speed
+    assert gathered == pytest.approx(parabola(np.hypot(*x.T)), abs=2e-5)
+
+
 PASTE = {"density": 2000.0, "youngs_modulus": 1e5, "poisson_ratio": 0.45, "yield_stress": 1e3}
 SYRUP = {"density": 1000.0, "viscosity": 10.0, "sound_speed": 10.0}
 NOZZLE = {"diameter": 0.02, "exit_speed": 0.02, "standoff": 0.02}
@@ -70,15 +104,13 @@ DROP = {"bodies": [{"kind": "sphere", "center": [0.05] * 3, "radius": 0.02}], "m
         (1, {"material": PASTE, "nozzle": NOZZLE}),
         (1, {"material": SYRUP, "nozzle": NOZZLE}),
         (1, {"material": SYRUP, "nozzle": NOZZLE, "numerics": {"mpm": {"viscosity": "implicit"}}}),
-        (0, {"material": SYRUP, "nozzle": NOZZLE | {"tip": "flat"}}),
-        (0, {"material": PASTE, "nozzle": NOZZLE | {"profile": "developed"}}),
+        (1, {"material": SYRUP, "nozzle": NOZZLE | {"tip": "flat"}}),
+        (1, {"material": PASTE, "nozzle": NOZZLE | {"profile": "developed"}}),
         (0, DROP),
     ],
     ids=["paste", "liquid", "implicit", "body", "developed", "drop"],
 )
-def test_it_acts_where_nothing_else_pushes(on, table):
-    """Beside a rigid body what is carried passes its push on by itself; where a profile has developed nothing goes as a
-    plug."""
+def test_it_acts_wherever_something_is_fed(on, table):
     path = {"toolpath": {"kind": "line", "start": [0.04, 0.05], "end": [0.06, 0.05], "speed": 0.02}}
     scenario = define(
         "piston",
@@ -114,7 +146,7 @@ def test_it_goes_as_what_is_carried_does():
         drift, feeding = hours.drift.numpy()[row - 1], float(hours.feeding.numpy()[row - 1])
         frame = sim.frame()
         carried = frame["velocity"][frame["held"] == CARRIED]
-        piston = drift - [0.0, 0.0, feeding * sim.solver.piston.speed]
+        piston = drift - [0.0, 0.0, feeding * sim.solver.piston.speed.numpy()[0]]
         if len(carried):
             assert carried.mean(axis=0) == pytest.approx(piston, abs=1e-4)
         seen.add(tuple(np.round(piston, 3)))

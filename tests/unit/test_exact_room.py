@@ -1,0 +1,65 @@
+"""What MPM's nodes tell of the space that matter shares, by hand."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from fluidbench.native.simulation import Simulation
+from solvers.mpm.grid import Grid
+from solvers.mpm.nodes import room_of
+
+from ..conftest import scenario
+
+EDGE, D, DENSITY = 0.16, 0.01, 1000.0
+
+
+@wp.kernel
+def ask(
+    grid: Grid,
+    position: wp.array(dtype=wp.vec3),
+    density: float,
+    table: wp.array(dtype=int),
+    moving: wp.array(dtype=wp.vec4),
+    found: wp.array(dtype=float),
+):
+    p = wp.tid()
+    found[p] = room_of(grid, 0, position[p], density, table, moving)
+
+
+def rooms(moved, walls="periodic"):
+    """Of the particles of a cube that fills its domain, each `moved` from its place in a lattice [m]."""
+    sides = {f"{axis}_{side}": walls for axis in "xyz" for side in ("lower", "upper")}
+    s = scenario(
+        domain={"lower": [0.0] * 3, "upper": [EDGE] * 3, "walls": sides},
+        bodies=[{"kind": "box", "center": [EDGE / 2] * 3, "size": [EDGE] * 3}],
+        gravity=[0, 0, 0],
+        spacing=D,
+        material={"density": DENSITY, "viscosity": 1.0},
+    )
+    sim = Simulation(s, "mpm", graphs=False)
+    sim.prepare()
+    sim.begin()
+    pool, solver = sim.pool, sim.solver
+    x = pool.position.numpy().astype(float) + moved(pool.size)
+    pool.position.assign((x % EDGE if walls == "periodic" else x).astype(np.float32))
+    solver.refresh()
+    sim.scene.set_dt(1e-9)
+    for name in ("clear_grid", "p2g", "grid_step"):
+        getattr(solver, name)()
+    found = wp.zeros(pool.size, dtype=float)
+    wp.launch(ask, pool.size, [solver.grid, pool.position, DENSITY, solver.table, solver.moving], [found])
+    return found.numpy().astype(float)
+
+
+@pytest.mark.parametrize("walls", ["periodic", "stick"])
+def test_a_lattice_has_its_own_space_and_walls_mirror_it(walls):
+    assert rooms(lambda n: np.zeros((n, 3)), walls) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_all_particles_take_all_of_the_space_however_they_lie():
+    """Each has as much mass as any other: the mean of their shares is 1. (One over the density that the grid shows them
+    is less in the mean.)"""
+    rng = np.random.default_rng(5)
+    found = rooms(lambda n: rng.uniform(-0.9 * D, 0.9 * D, (n, 3)))
+    assert found.mean() == pytest.approx(1.0, abs=1e-4)
+    assert found.std() > 0.03
