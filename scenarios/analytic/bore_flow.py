@@ -74,9 +74,5 @@ CASE = Case(
     tolerance=0.10,
     scenarios=scenarios,
     evaluate=evaluate,
-    causes={
-        "mpm": "what is fed in is crowded by where the inlet lies between nodes: 10 % halfway between two, 2 % on one "
-        "(with walls on nodes 12 and 0.2 %, the other way round)",
-    },
     skipped={"pbd": "it has no pressure"},
 )
