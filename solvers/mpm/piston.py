@@ -8,7 +8,7 @@ down, for what flows away faster is not held back. Only while it extrudes: what 
 
 The piston is firm, its nodes move at its speed and not faster either, where viscosity is solved for (which faster nodes
 would make another equation with every velocity; whatever pushes at them changes nothing), and in the bore of a body:
-there it is on when nothing is extruded, too, and holds what is below it.
+there it drives the nodes in the wall, too, and holds what is below it when nothing is extruded.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,6 +26,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 # How far below the exit the first row of nodes may lie, in cells. What is pressed from farther below comes out wider;
 # where the first row lies more than the rest of a cell above it, the piston holds as little as none would.
 BELOW = wp.constant(0.3)
+REACHED = wp.constant(1.5)  # by the nodes of a particle [cells]
 WIDE = wp.constant(2.0)  # how far the flow is tabled, as nodes in the wall of a body ask for it [radii of the bore]
 FINE = wp.constant(256)  # parts of the square of that, between which speeds are linear, as a parabola is
 
@@ -88,10 +89,13 @@ def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
     before = wp.max(row - 1, 0)
     feeding = piston.feeding[before]
     away = x - piston.exit[row]
-    share = wp.length(wp.vec2(away[0], away[1])) / piston.bore
-    if (feeding > 0.0 or piston.walled == 1) and away[2] > -BELOW * grid.dx[2] and (share < 1.0 or piston.walled == 1):
+    radius = wp.length(wp.vec2(away[0], away[1]))
+    within = piston.bore
+    if piston.walled == 1:
+        within += wp.sqrt(2.0) * REACHED * grid.dx[0]
+    if (feeding > 0.0 or piston.walled == 1) and away[2] > -BELOW * grid.dx[2] and radius < within:
         out = piston.drift[before]
-        out[2] -= feeding * speed_of(piston, share)
+        out[2] -= feeding * speed_of(piston, radius / piston.bore)
         if piston.firm == 0:
             out[2] = wp.min(v[2], out[2])
         if piston.still == 1:

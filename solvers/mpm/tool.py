@@ -31,12 +31,11 @@ from ..tool import Tool, mirrored, outside, table_of, tool_of
 from .grid import Grid, first_node, node_at
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
 from .particle import columns_scaled, inertia, kirchhoff, resistance_of, viscous, weights
-from .piston import Piston
+from .piston import REACHED, Piston
 
 wp.set_module_options({"enable_backward": False})
 
 REACH = 2.5  # of images [cells]: nodes behind the surface that particles in front of it read are then complete
-REACHED = wp.constant(1.5)  # by the nodes of a particle [cells]
 DIFFUSION = wp.constant(0.1)  # of J, over c dx; of densities: Antuono et al. 2010, Comput. Phys. Commun. 181:532
 
 
@@ -157,8 +156,7 @@ def level(
     # outputs
     volume_ratio: wp.array(dtype=float),
 ):
-    """Volume ratios diffuse towards those of the nodes; within the bore
-    towards the space that there is."""
+    """Volume ratios diffuse towards those of the nodes; within the bore towards the space that there is."""
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:

@@ -72,8 +72,11 @@ def test_in_the_bore_of_a_body_it_drives_the_wall_too_and_holds_when_nothing_is_
     wall = [*INSIDE, *OUTSIDE[1:]]
     assert answers(wall, (7, 8, -9), firm=1, walled=1) == pytest.approx(np.tile([4, 5, DOWN], (5, 1)))
     assert answers(wall, (7, 8, 9), feeding=0.0, firm=1, walled=1) == pytest.approx(np.tile([4, 5, 0.2], (5, 1)))
-    below = answers(OUTSIDE[:1], (7, 8, 9), firm=1, walled=1)
-    assert below == pytest.approx(np.array([[7.0, 8.0, 9.0]]))
+    beyond = [
+        OUTSIDE[0],
+        [1.19, 2, 3.5],
+    ]  # below the exit, and farther than particles in the bore reach: 1.5 cells on both axes
+    assert answers(beyond, (7, 8, 9), firm=1, walled=1) == pytest.approx(np.tile([7, 8, 9], (2, 1)))
 
 
 def test_particles_gather_the_profile_from_what_it_gives_to_nodes():
