@@ -16,7 +16,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
-# How viscosity is taken in a step, `drags`: solved for; as a stress; the same, under a pressure that a piston holds.
+# How viscosity is taken in a step, `drags`: solved for; as a stress; the same, where what is carried is stressed, too.
 IMPLICIT, EXPLICIT, PRESSED = wp.constant(0), wp.constant(1), wp.constant(2)
 # Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
 # they share: a beam falls slowly off it.

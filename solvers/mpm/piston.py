@@ -66,11 +66,13 @@ def piston_of(scene: Scene, dx: Sequence[float], firm: bool = False, still: bool
 def sharpened(profile: Callable[[np.ndarray], np.ndarray], radius: float, square: float) -> np.ndarray:
     """Speeds of nodes, of cells of so many square metres, from which particles gather a profile of the distance from
     the axis: splines add dx^2 / 8 times its Laplacian to what they smooth, by s = r^2 that is 4 u' + 4 s u''. At equal
-    steps of s, shape (FINE + 1,)."""
+    steps of s, shape (FINE + 1,). Of a parabola that is U dx^2 / R^2, and no more is given back anywhere: layers
+    thinner than a cell, as a yield stress leaves at the rim, are beyond what nodes can hold."""
     s = (WIDE * radius) ** 2 * np.linspace(0.0, 1.0, FINE + 1)
     u = profile(np.sqrt(s))
     slope = np.gradient(u, s)
-    return u - 0.5 * square * (slope + s * np.gradient(slope, s))
+    most = square / radius**2 * np.abs(u[s <= radius**2].mean())
+    return u - np.clip(0.5 * square * (slope + s * np.gradient(slope, s)), -most, most)
 
 
 @wp.func
@@ -92,7 +94,7 @@ def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
     radius = wp.length(wp.vec2(away[0], away[1]))
     within = piston.bore
     if piston.walled == 1:
-        within += wp.sqrt(2.0) * REACHED * grid.dx[0]
+        within += REACHED * wp.sqrt(grid.dx[0] * grid.dx[0] + grid.dx[1] * grid.dx[1])
     if (feeding > 0.0 or piston.walled == 1) and away[2] > -BELOW * grid.dx[2] and radius < within:
         out = piston.drift[before]
         out[2] -= feeding * speed_of(piston, radius / piston.bore)

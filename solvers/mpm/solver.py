@@ -282,12 +282,13 @@ class SolverMPM(Solver):
         )
 
     def g2p(self) -> None:
+        if self.held is not None:
+            self.empty(self.held.nodes)
+            self.held.level(self.table, self.piston, self.moving)
         self.gather()
         if self.held is not None:
             homes = None if self.by_block is None else self.by_block.homes
             self.held.keep_out(self.table, self.block_of, self.active, homes)
-            self.empty(self.held.nodes)
-            self.held.level(self.table, self.piston, self.moving)
 
     def gather(self) -> None:
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours

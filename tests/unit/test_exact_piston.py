@@ -7,7 +7,9 @@ import warp as wp
 from fluidbench.method.frame import CARRIED
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
+from fluidbench.scenario.bore import Bore
 from fluidbench.scenario.library import define
+from fluidbench.scenario.material import Material
 from solvers.mpm.grid import Grid
 from solvers.mpm.piston import Piston, driven, sharpened
 from solvers.smoothing import quadratic_spline
@@ -93,6 +95,18 @@ def test_particles_gather_the_profile_from_what_it_gives_to_nodes():
             speed = 0.2 - answers(places, (0, 0, 0), feeding=1.0, firm=1, walled=1, profile=parabola)[:, 2]
             gathered += share[:, 0, i] * share[:, 1, j] * speed
     assert gathered == pytest.approx(parabola(np.hypot(*x.T)), abs=2e-5)
+
+
+def test_a_rim_thinner_than_a_cell_is_not_overshot():
+    """A Bingham plug: what nodes hold stays within a parabola's share of the mean speed."""
+    law = Material(density=2000.0, youngs_modulus=1e6, yield_stress=1e3, plastic_viscosity=0.1)
+    bore = Bore(law, 0.2, 0.2)
+    nodes = sharpened(bore.profile, 0.1, 0.025**2)
+    s = 4.0 * np.linspace(0.0, 1.0, len(nodes))
+    exact = bore.profile(0.1 * np.sqrt(s))
+    inside = s <= 1.0
+    assert exact[inside].min() < 0.5 < 1.0 < exact[0] < 1.1
+    assert np.abs(nodes - exact)[inside].max() <= 1.001 * 0.25**2 * exact[inside].mean()
 
 
 PASTE = {"density": 2000.0, "youngs_modulus": 1e5, "poisson_ratio": 0.45, "yield_stress": 1e3}
