@@ -160,13 +160,15 @@ def level(
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
-        mean = mean_of_nodes(grid, world, position[p], False, table, nodes)[0]
         away = position[p] - piston.exit[piston.row[0]]
         within = away[0] * away[0] + away[1] * away[1] < piston.bore * piston.bore
+        target = float(0.0)
         if held[p] == FREE and within and away[2] + piston.rise > REACHED * grid.dx[2]:
-            mean = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
+            target = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
+        else:
+            target = mean_of_nodes(grid, world, position[p], False, table, nodes)[0]
         part = DIFFUSION * dt[world] * phases[world, phase_of[p]].wave_speed * grid.inv_dx[0]
-        volume_ratio[p] = volume_ratio[p] + wp.min(part, 1.0) * (mean - volume_ratio[p])
+        volume_ratio[p] = volume_ratio[p] + wp.min(part, 1.0) * (target - volume_ratio[p])
 
 
 class Held:

@@ -74,15 +74,13 @@ def test_in_the_bore_of_a_body_it_drives_the_wall_too_and_holds_when_nothing_is_
     wall = [*INSIDE, *OUTSIDE[1:]]
     assert answers(wall, (7, 8, -9), firm=1, walled=1) == pytest.approx(np.tile([4, 5, DOWN], (5, 1)))
     assert answers(wall, (7, 8, 9), feeding=0.0, firm=1, walled=1) == pytest.approx(np.tile([4, 5, 0.2], (5, 1)))
-    beyond = [
-        OUTSIDE[0],
-        [1.19, 2, 3.5],
-    ]  # below the exit, and farther than particles in the bore reach: 1.5 cells on both axes
+    reach = 0.1 + 1.5 * np.hypot(0.04, 0.04)  # of matter in the bore, on both axes
+    beyond = [OUTSIDE[0], [1.0 + 1.01 * reach, 2, 3.5]]
     assert answers(beyond, (7, 8, 9), firm=1, walled=1) == pytest.approx(np.tile([7, 8, 9], (2, 1)))
 
 
 def test_particles_gather_the_profile_from_what_it_gives_to_nodes():
-    """Of a parabola exactly, in the wall as before it: cells of 0.04 in a bore of radius 0.1."""
+    """Of a parabola exactly, up to the wall, in which some of the nodes lie: cells of 0.04 in a bore of radius 0.1."""
     rng = np.random.default_rng(3)
     x = rng.uniform(-0.07, 0.07, (40, 2))
     base = np.floor(x / 0.04 - 0.5)

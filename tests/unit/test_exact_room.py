@@ -57,8 +57,7 @@ def test_a_lattice_has_its_own_space_and_walls_mirror_it(walls):
 
 
 def test_all_particles_take_all_of_the_space_however_they_lie():
-    """Each has as much mass as any other: the mean of their shares is 1. (One over the density that the grid shows them
-    is less in the mean.)"""
+    """Each has as much mass as any other: the mean of their shares is 1."""
     rng = np.random.default_rng(5)
     found = rooms(lambda n: rng.uniform(-0.9 * D, 0.9 * D, (n, 3)))
     assert found.mean() == pytest.approx(1.0, abs=1e-4)
