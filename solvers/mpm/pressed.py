@@ -7,7 +7,7 @@ from fluidbench.scenario.stream import COLUMN
 
 from .grid import cells_of
 
-ACROSS = 5.0  # cells across a bore: with fewer its resistance is off by more than 10 % (15 with 4)
+ACROSS = 6.0  # cells across a bore: with fewer its resistance can be off by more than 10 % (docs/physics.md)
 
 
 def unpressed(scenario: Scenario, config: Any) -> str | None:
@@ -34,6 +34,6 @@ def roughly_pressed(scenario: Scenario, config: Any) -> list[str]:
     if scenario.fed_from is None or cells >= ACROSS:
         return []
     return [
-        f"what it presses through is {cells:.2g} cells wide: below {ACROSS:g} its resistance is off by more than 10 %; "
+        f"what it presses through is {cells:.2g} cells wide: below {ACROSS:g} its resistance can be off by more than 10 %; "
         "use numerics.mpm.grid_ratio = 1 or a smaller spacing"
     ]
