@@ -34,6 +34,6 @@ def roughly_pressed(scenario: Scenario, config: Any) -> list[str]:
     if scenario.fed_from is None or cells >= ACROSS:
         return []
     return [
-        f"what it presses through is {cells:.2g} cells wide: below {ACROSS:g} its resistance can be off by more than 10 %; "
-        "use numerics.mpm.grid_ratio = 1 or a smaller spacing"
+        f"what it presses through is {cells:.2g} cells wide: below {ACROSS:g} its resistance can be off by more than "
+        "10 %; use numerics.mpm.grid_ratio = 1 or a smaller spacing"
     ]
