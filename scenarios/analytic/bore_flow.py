@@ -35,7 +35,7 @@ def flow(material: dict[str, float], spacing: float) -> Scenario:
         output_interval=end / 30,
         spacing=spacing,
         sound_speed_ratio=5.0,
-        numerics={"mpm": {"grid_ratio": 1.0, "shifting": 2.0}},
+        numerics={"mpm": {"grid_ratio": 1.0}},
     )
 
 

@@ -46,7 +46,7 @@ def strand(gap: float, spacing: float) -> Scenario:
         output_interval=end / (4 * TIME),
         spacing=spacing,
         sound_speed_ratio=5.0,
-        numerics={"mpm": {"grid_ratio": 1.0, "shifting": 2.0}},
+        numerics={"mpm": {"grid_ratio": 1.0}},
     )
 
 

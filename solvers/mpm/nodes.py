@@ -76,22 +76,24 @@ def mean_of_nodes(
 def room_of(
     grid: Grid, world: int, x: wp.vec3, density: float, table: wp.array(dtype=int), moving: wp.array(dtype=wp.vec4)
 ):
-    """The volume ratio of matter of a rest density [kg/m^3] at x that shares the space of its nodes, whose densities
-    come fourth: sum w rho0 / rho. All particles together then take the space of all nodes, however they lie (the mean
-    of rho itself is too high where they are in disorder)."""
+    """(the volume ratio of matter of a rest density [kg/m^3] at x that shares the space of its nodes, whose densities
+    come fourth: sum w rho0 / rho; the least of rho / rho0). All particles together then take the space of all nodes,
+    however they lie (the mean of rho itself is too high where they are in disorder)."""
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
     room = float(0.0)
+    least = PACKED
     for o in range(3):
         for q in range(3):
             for r in range(3):
                 inside = in_front(grid, base + wp.vec3i(o, q, r))
                 at = node_at(grid, world, on_grid(grid, inside), table)
-                held = float(0.0)
+                full = float(0.0)
                 if at >= 0:
-                    held = moving[at][3]
-                room += wx[o] * wy[q] * wz[r] * density / wp.max(held, density / PACKED)
-    return room
+                    full = moving[at][3] / density
+                least = wp.min(least, full)
+                room += wx[o] * wy[q] * wz[r] / wp.max(full, 1.0 / PACKED)
+    return room, least
 
 
 @wp.func

@@ -198,6 +198,14 @@ def taken(
 
 
 @wp.func
+def down_the_slope(grid: Grid, phase: Phase, sums: wp.mat44, c: wp.mat33, step: float):
+    """-step |2 dev D| dx^2 grad(rho) / rho0 [m], of the sums that a particle gathers: 4 sum w rho (x_i - x) is
+    dx^2 grad(rho)."""
+    slope = wp.cw_mul(wp.vec3(sums[1, 3], sums[2, 3], sums[3, 3]), grid.dx)
+    return -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / phase.density) * slope
+
+
+@wp.func
 def shifted(
     grid: Grid,
     phase: Phase,
@@ -207,7 +215,7 @@ def shifted(
     volume_ratio: float,
     held: int,
 ):
-    """How far a particle is shifted out of a crowd [m]: -step |2 dev D| dx^2 grad(rho) / rho0, where rho J > rho0.
+    """How far a particle is shifted out of a crowd [m]: down the slope of the density where rho J > rho0.
 
     Matter that is stretched beyond the width of a cell leaves gaps between its particles that no stress holds open,
     and its volume is lost. Shifting fills them (Fick's law, Lind et al. 2012), in proportion to the strain that makes
@@ -216,10 +224,7 @@ def shifted(
     by = wp.vec3(0.0, 0.0, 0.0)
     crowding = sums[0, 3] * volume_ratio / phase.density
     if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
-        # 4 sum w rho (x_i - x) is dx^2 grad(rho)
-        by = -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / phase.density) * wp.cw_mul(
-            wp.vec3(sums[1, 3], sums[2, 3], sums[3, 3]), grid.dx
-        )
+        by = down_the_slope(grid, phase, sums, c, step)
     return by
 
 

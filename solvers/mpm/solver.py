@@ -137,7 +137,7 @@ class SolverMPM(Solver):
         )
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
-        self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots)
+        self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots, self.shifting)
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
         apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
@@ -284,7 +284,7 @@ class SolverMPM(Solver):
     def g2p(self) -> None:
         if self.held is not None:
             self.empty(self.held.nodes)
-            self.held.level(self.table, self.piston, self.moving)
+            self.held.level(self.table, self.moving)
         self.gather()
         if self.held is not None:
             homes = None if self.by_block is None else self.by_block.homes

@@ -12,10 +12,18 @@ What is gathered is that of nodes in front, not the transpose of what was scatte
 wherever it is curved, and let the last of the images expand into the void behind them.) Viscous stress damps the
 velocity. What it leaves shows in the volume ratios, which drift apart from particle to particle until pressures tear
 the flow up; so they diffuse, as densities do in SPH: J += dt DIFFUSION c / dx (<J> - J), <J> that of the nodes. What
-they drift by together stays: along a bore matter came to be packed by up to a quarter more than its J told. A bore has
-no free surface, and matter shares its space: there <J> is the share. Nothing like it holds a paste, whose stress
-drifts, too; viscosity that is solved for, of which images know nothing; or what slips. All three are refused
-(pressed.py).
+they drift by together stays: along a bore matter came to be packed by up to a quarter more than its J told. Where there
+is no free surface matter shares its space, so there strain takes off what strain brings in: J += dt SETTLING shifting
+|2 dev D| (<room> - J), less near free surfaces. (In proportion to strain, and by way of nodes: as particles pass nodes,
+their room flickers by some percent, and with a high speed of sound that is more than the pressure that drives them.)
+
+Particles follow streamlines, and those nearest to a wall leave it where it turns: of what flows at s from the wall of a
+bore there is nothing nearer, and past the rim it flows at some 3 s from the face. No strain tells of the gap, and a
+strand let go of the face that should hold it. So here shifting goes both ways, into gaps, too; beside a free surface
+only towards the body. What it takes of volume, J learns as it settles.
+
+Nothing like it holds a paste, whose stress drifts, too; viscosity that is solved for, of which images know nothing; or
+what slips. All three are refused (pressed.py).
 """
 
 from typing import Any
@@ -27,16 +35,19 @@ from fluidbench.native.crew import index_of
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Phase, Scene
 
+from ..flow import shear_rate
 from ..tool import Tool, mirrored, outside, table_of, tool_of
-from .grid import Grid, first_node, node_at
+from .grid import Grid, first_node, node_at, node_parts, slots_of
+from .kernels_warp import sums_of
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
-from .particle import columns_scaled, inertia, kirchhoff, resistance_of, viscous, weights
-from .piston import REACHED, Piston
+from .particle import columns_scaled, down_the_slope, inertia, kirchhoff, resistance_of, viscous, weights
 
 wp.set_module_options({"enable_backward": False})
 
 REACH = 2.5  # of images [cells]: nodes behind the surface that particles in front of it read are then complete
 DIFFUSION = wp.constant(0.1)  # of J, over c dx; of densities: Antuono et al. 2010, Comput. Phys. Commun. 181:532
+SETTLING = wp.constant(4.0)  # of J towards the room that there is, over shifting: with 1 a bore is 2 % too full
+HALF = wp.constant(0.5)  # full: a node on a free surface
 
 
 @wp.kernel
@@ -99,6 +110,7 @@ def keep_out(
     capacity: int,
     count: wp.array(dtype=int),
     held: wp.array(dtype=int),
+    shift: wp.array(dtype=wp.vec3),
     # outputs
     position: wp.array(dtype=wp.vec3),
     table: wp.array(dtype=int),
@@ -107,13 +119,52 @@ def keep_out(
     homes: wp.array(dtype=int),
     fault: wp.array(dtype=int),
 ):
-    """What would enter the body stays in front of it, among active nodes."""
+    """What is free is shifted, and stays in front of the body, among active nodes."""
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world] and held[p] == FREE:
         before = position[p]
-        position[p] = outside(tool, before)
+        position[p] = outside(tool, before + shift[p])
         follow(grid, world, before, position[p], table, block_of, active, homes, fault)
+
+
+@wp.func
+def gathered(grid: Grid, world: int, x: wp.vec3, table: wp.array(dtype=int), moving: wp.array(dtype=wp.vec4)):
+    """The sums over its nodes of a particle at x."""
+    base = first_node(grid, x)
+    f, wx, wy, wz = weights(grid, x, base)
+    bx, by, bz, lx, ly, lz = node_parts(grid, base)
+    s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
+    return sums_of(moving, f, wx, wy, wz, bx, by, bz, lx, ly, lz, s0, s1, s2, s3, s4, s5, s6, s7)
+
+
+@wp.func
+def into_gaps(
+    grid: Grid,
+    tool: Tool,
+    reach: float,
+    world: int,
+    phase: Phase,
+    x: wp.vec3,
+    c: wp.mat33,
+    step: float,
+    volume_ratio: float,
+    table: wp.array(dtype=int),
+    moving: wp.array(dtype=wp.vec4),
+):
+    """How far a free particle is shifted into a gap [m]: down the slope of the density where rho J < rho0."""
+    by = wp.vec3(0.0, 0.0, 0.0)
+    sums = gathered(grid, world, x, table, moving)
+    crowding = sums[0, 3] * volume_ratio / phase.density
+    if crowding < 1.0:
+        down = down_the_slope(grid, phase, sums, c, step)
+        _room, least = room_of(grid, world, x, phase.density, table, moving)
+        _image, fill, normal = mirrored(tool, x, reach)
+        if least > HALF:
+            by = down
+        elif fill > 0.0 and crowding > HALF:
+            by = wp.min(wp.dot(down, normal), 0.0) * normal
+    return by
 
 
 @wp.kernel
@@ -122,17 +173,25 @@ def spread(
     capacity: int,
     count: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     volume_ratio: wp.array(dtype=float),
+    held: wp.array(dtype=int),
     table: wp.array(dtype=int),
+    moving: wp.array(dtype=wp.vec4),
     # outputs
     nodes: wp.array(dtype=wp.vec4),
 ):
-    """(sum of w V0 J, -, -, sum of w V0) to nodes."""
+    """(sum of w V0 J, of w V0 times the room that there is away from free surfaces, -, sum of w V0) to nodes."""
     p = wp.tid()
     world = p / capacity
     if p - world * capacity < count[world]:
-        row = volume[p] * wp.vec4(volume_ratio[p], 0.0, 0.0, 1.0)
+        j = volume_ratio[p]
+        room = j
+        if held[p] == FREE:
+            all, least = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
+            room += wp.clamp((least - HALF) / (1.0 - HALF), 0.0, 1.0) * (all - j)
+        row = volume[p] * wp.vec4(j, room, 0.0, 1.0)
         tell_nodes(grid, world, position[p], False, row, table, nodes)
 
 
@@ -140,47 +199,51 @@ def spread(
 def level(
     share: wp.vec3i,
     grid: Grid,
+    tool: Tool,
+    reach: float,
     capacity: int,
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
-    mass: wp.array(dtype=float),
-    volume: wp.array(dtype=float),
+    affine: wp.array(dtype=wp.mat33),
     held: wp.array(dtype=int),
-    piston: Piston,
+    shifting: float,
     table: wp.array(dtype=int),
     nodes: wp.array(dtype=wp.vec4),
     moving: wp.array(dtype=wp.vec4),
     # outputs
     volume_ratio: wp.array(dtype=float),
+    shift: wp.array(dtype=wp.vec3),
 ):
-    """Volume ratios diffuse towards those of the nodes; within the bore towards the space that there is."""
+    """Volume ratios diffuse towards those of the nodes and settle towards the room that there is; shifts into gaps."""
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
-        away = position[p] - piston.exit[piston.row[0]]
-        within = away[0] * away[0] + away[1] * away[1] < piston.bore * piston.bore
-        target = float(0.0)
-        if held[p] == FREE and within and away[2] + piston.rise > REACHED * grid.dx[2]:
-            target = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
-        else:
-            target = mean_of_nodes(grid, world, position[p], False, table, nodes)[0]
-        part = DIFFUSION * dt[world] * phases[world, phase_of[p]].wave_speed * grid.inv_dx[0]
-        volume_ratio[p] = volume_ratio[p] + wp.min(part, 1.0) * (target - volume_ratio[p])
+        x, j, phase = position[p], volume_ratio[p], phases[world, phase_of[p]]
+        mean = mean_of_nodes(grid, world, x, False, table, nodes)
+        step = shifting * dt[world]
+        by = wp.vec3(0.0, 0.0, 0.0)
+        change = wp.min(DIFFUSION * dt[world] * phase.wave_speed * grid.inv_dx[0], 1.0) * (mean[0] - j)
+        if held[p] == FREE:
+            change += wp.min(SETTLING * step * shear_rate(affine[p]), 1.0) * (mean[1] - j)
+            by = into_gaps(grid, tool, reach, world, phase, x, affine[p], step, j, table, moving)
+        volume_ratio[p] = j + change
+        shift[p] = by
 
 
 class Held:
     """The body of a scene, and its launches."""
 
-    def __init__(self, scene: Scene, pool: Pool, grid: Grid, slots: int) -> None:
-        """`slots` are the blocks of the grid that can be active."""
-        self.scene, self.pool, self.grid = scene, pool, grid
+    def __init__(self, scene: Scene, pool: Pool, grid: Grid, slots: int, shifting: float) -> None:
+        """`slots` are the blocks of the grid that can be active; `shifting` is over the strain."""
+        self.scene, self.pool, self.grid, self.shifting = scene, pool, grid, shifting
         self.reach = REACH * max(grid.dx)
         self.tool = tool_of(scene, self.reach + scene.spacing)
         with wp.ScopedDevice(scene.device):
             self.nodes = wp.zeros(64 * slots, dtype=wp.vec4)
+            self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self._nobody = wp.zeros(1, dtype=int)
 
     def reflect(self, dt: wp.array, table: wp.array, raw: wp.array) -> None:
@@ -195,20 +258,19 @@ class Held:
         self.scene.crew.launch(
             keep_out,
             pool.size,
-            [self.grid, self.tool, pool.capacity, pool.count, pool.held],
+            [self.grid, self.tool, pool.capacity, pool.count, pool.held, self.shift],
             [pool.position, table, block_of, active, outdated, pool.fault],
         )
 
-    def level(self, table: wp.array, piston: Any, moving: wp.array) -> None:
-        """Enqueue: volume ratios diffuse, by way of `nodes`, which are empty."""
+    def level(self, table: wp.array, moving: wp.array) -> None:
+        """Enqueue: volume ratios diffuse and settle, by way of `nodes`, which are empty; who is to be shifted."""
         pool, scene = self.pool, self.scene
-        matter = [self.grid, pool.capacity, pool.count]
-        scene.crew.launch(
-            spread, pool.size, [*matter, pool.position, pool.volume, pool.volume_ratio, table], [self.nodes]
-        )
-        inputs = [*matter, scene.dt, scene.phases, pool.phase, pool.position, pool.mass, pool.volume, pool.held]
-        inputs += [piston, table, self.nodes, moving]
-        scene.crew.launch(level, pool.size, inputs, [pool.volume_ratio])
+        some = [pool.capacity, pool.count]
+        shares = [pool.position, pool.mass, pool.volume, pool.volume_ratio, pool.held, table, moving]
+        scene.crew.launch(spread, pool.size, [self.grid, *some, *shares], [self.nodes])
+        flow = [scene.dt, scene.phases, pool.phase, pool.position, pool.affine, pool.held, self.shifting]
+        inputs = [self.grid, self.tool, self.reach, *some, *flow, table, self.nodes, moving]
+        scene.crew.launch(level, pool.size, inputs, [pool.volume_ratio, self.shift])
 
     def footprint(self) -> dict[str, int]:
-        return {"tool.nodes": self.nodes.capacity} | table_of(self.tool)
+        return {"tool.nodes": self.nodes.capacity, "tool.shift": self.shift.capacity} | table_of(self.tool)
