@@ -16,9 +16,9 @@ REYNOLDS = 0.05
 VISCOSITY = DENSITY * SPEED * DIAMETER / REYNOLDS
 AREA = np.pi / 4.0  # over D^2: Q / V, at a travel speed V that is the exit speed
 GAPS = (0.6, 0.8, 1.0)  # over D
-TIME = 9.0  # D / U: what is laid is steady 3.5 D behind the axis from 7 on
+TIME = 12.0  # D / U: what is laid is steady 3.5 D behind the axis from 7 on, but for waves of some percent
 BEHIND = 3.5  # D
-LAST = 8  # frames, 0.25 D / U apart, over which a moving section is averaged
+LAST = 16  # frames, 0.25 D / U apart, over which a moving section is averaged
 TOLERANCES = {"width": 0.08, "height": 0.08, "contact": 0.15, "area": 0.02, "pressure": 0.10}
 
 
