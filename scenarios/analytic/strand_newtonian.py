@@ -107,8 +107,6 @@ CASE = Case(
     evaluate=evaluate,
     exempt={"pbd": "area 3 to 7 % too large, 0 to 6 % at D / 12, height at 0.8 D 15 and 6 %; it has no pressure"},
     causes={
-        "mpm": "height 15 % short at 1.0 D and 12 at 0.6 D, area 3 % at 0.6 D; at D / 12 height 13 % at 1.0 D and all "
-        "else within: by where the tip's face lies between nodes (1 to 6 % short where it lies on one)",
         "sph": "at 1.0 D contact 33 % and area 5 % short, 20 and 1.5 % at D / 12: the wedge beside the contact is "
         "finer than the deposit's resolution",
     },

@@ -14,7 +14,9 @@ class ConfigMPM(Config):
     safety: Annotated[float, Field(gt=0, le=1.0)] = Field(0.8, description="share of the exact stability limit used")
     advection: Annotated[float, Field(gt=0, lt=1.0)] = Field(0.5, description="cells that matter may cross in a step")
     shifting: Annotated[float, Field(ge=0)] = Field(
-        8.0, description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2"
+        8.0,
+        description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2; with a nozzle's tip "
+        "into gaps, too",
     )
     separation: Annotated[float, Field(ge=0)] = Field(
         0.5, description="shift of particles that are too near each other, over strain and crowding"

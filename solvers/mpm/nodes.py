@@ -5,7 +5,7 @@ import warp as wp
 
 from .grid import Grid, activate_stencil, first_node, node_at
 from .homes import on_grid
-from .particle import PACKED, weights
+from .particle import ANCHORED, PACKED, weights
 from .walls import in_front
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -78,7 +78,7 @@ def room_of(
 ):
     """(the volume ratio of matter of a rest density [kg/m^3] at x that shares the space of its nodes, whose densities
     come fourth: sum w rho0 / rho; the least of rho / rho0). All particles together then take the space of all nodes,
-    however they lie (the mean of rho itself is too high where they are in disorder)."""
+    however they lie (the mean of rho itself is too high where they are in disorder). What a clamp holds is full."""
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
     room = float(0.0)
@@ -91,6 +91,8 @@ def room_of(
                 full = float(0.0)
                 if at >= 0:
                     full = moving[at][3] / density
+                if full > ANCHORED:
+                    full = 1.0
                 least = wp.min(least, full)
                 room += wx[o] * wy[q] * wz[r] / wp.max(full, 1.0 / PACKED)
     return room, least

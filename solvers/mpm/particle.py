@@ -198,11 +198,11 @@ def taken(
 
 
 @wp.func
-def down_the_slope(grid: Grid, phase: Phase, sums: wp.mat44, c: wp.mat33, step: float):
-    """-step |2 dev D| dx^2 grad(rho) / rho0 [m], of the sums that a particle gathers: 4 sum w rho (x_i - x) is
-    dx^2 grad(rho)."""
+def down_the_slope(grid: Grid, density: float, sums: wp.mat44, c: wp.mat33, step: float):
+    """-step |2 dev D| dx^2 grad(rho) / rho0 [m], of the sums that a particle of a rest density gathers: 4 sum w rho
+    (x_i - x) is dx^2 grad(rho)."""
     slope = wp.cw_mul(wp.vec3(sums[1, 3], sums[2, 3], sums[3, 3]), grid.dx)
-    return -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / phase.density) * slope
+    return -(wp.min(step * shear_rate(c), STEEPEST) * 4.0 / density) * slope
 
 
 @wp.func
@@ -224,7 +224,7 @@ def shifted(
     by = wp.vec3(0.0, 0.0, 0.0)
     crowding = sums[0, 3] * volume_ratio / phase.density
     if held == FREE and not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
-        by = down_the_slope(grid, phase, sums, c, step)
+        by = down_the_slope(grid, phase.density, sums, c, step)
     return by
 
 

@@ -13,7 +13,7 @@ wherever it is curved, and let the last of the images expand into the void behin
 velocity. What it leaves shows in the volume ratios, which drift apart from particle to particle until pressures tear
 the flow up; so they diffuse, as densities do in SPH: J += dt DIFFUSION c / dx (<J> - J), <J> that of the nodes. What
 they drift by together stays: along a bore matter came to be packed by up to a quarter more than its J told. Where there
-is no free surface matter shares its space, so there strain takes off what strain brings in: J += dt SETTLING shifting
+is no free surface matter shares its space, so there strain takes off what strain brings in: J += dt SETTLING
 |2 dev D| (<room> - J), less near free surfaces. (In proportion to strain, and by way of nodes: as particles pass nodes,
 their room flickers by some percent, and with a high speed of sound that is more than the pressure that drives them.)
 
@@ -40,13 +40,13 @@ from ..tool import Tool, mirrored, outside, table_of, tool_of
 from .grid import Grid, first_node, node_at, node_parts, slots_of
 from .kernels_warp import sums_of
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
-from .particle import columns_scaled, down_the_slope, inertia, kirchhoff, resistance_of, viscous, weights
+from .particle import columns_scaled, contained, down_the_slope, inertia, kirchhoff, resistance_of, viscous, weights
 
 wp.set_module_options({"enable_backward": False})
 
 REACH = 2.5  # of images [cells]: nodes behind the surface that particles in front of it read are then complete
 DIFFUSION = wp.constant(0.1)  # of J, over c dx; of densities: Antuono et al. 2010, Comput. Phys. Commun. 181:532
-SETTLING = wp.constant(4.0)  # of J towards the room that there is, over shifting: with 1 a bore is 2 % too full
+SETTLING = wp.constant(32.0)  # of J towards the room that there is, over the strain: with 8 a bore is 2 % too full
 HALF = wp.constant(0.5)  # full: a node on a free surface
 
 
@@ -124,7 +124,7 @@ def keep_out(
     world = p / capacity
     if p - world * capacity < count[world] and held[p] == FREE:
         before = position[p]
-        position[p] = outside(tool, before + shift[p])
+        position[p] = contained(grid, outside(tool, before + shift[p]))
         follow(grid, world, before, position[p], table, block_of, active, homes, fault)
 
 
@@ -144,7 +144,7 @@ def into_gaps(
     tool: Tool,
     reach: float,
     world: int,
-    phase: Phase,
+    density: float,
     x: wp.vec3,
     c: wp.mat33,
     step: float,
@@ -155,10 +155,10 @@ def into_gaps(
     """How far a free particle is shifted into a gap [m]: down the slope of the density where rho J < rho0."""
     by = wp.vec3(0.0, 0.0, 0.0)
     sums = gathered(grid, world, x, table, moving)
-    crowding = sums[0, 3] * volume_ratio / phase.density
+    crowding = sums[0, 3] * volume_ratio / density
     if crowding < 1.0:
-        down = down_the_slope(grid, phase, sums, c, step)
-        _room, least = room_of(grid, world, x, phase.density, table, moving)
+        down = down_the_slope(grid, density, sums, c, step)
+        _room, least = room_of(grid, world, x, density, table, moving)
         _image, fill, normal = mirrored(tool, x, reach)
         if least > HALF:
             by = down
@@ -189,8 +189,8 @@ def spread(
         j = volume_ratio[p]
         room = j
         if held[p] == FREE:
-            all, least = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
-            room += wp.clamp((least - HALF) / (1.0 - HALF), 0.0, 1.0) * (all - j)
+            share, least = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
+            room += wp.clamp((least - HALF) / (1.0 - HALF), 0.0, 1.0) * (share - j)
         row = volume[p] * wp.vec4(j, room, 0.0, 1.0)
         tell_nodes(grid, world, position[p], False, row, table, nodes)
 
@@ -208,6 +208,8 @@ def level(
     phase_of: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
     affine: wp.array(dtype=wp.mat33),
+    mass: wp.array(dtype=float),
+    volume: wp.array(dtype=float),
     held: wp.array(dtype=int),
     shifting: float,
     table: wp.array(dtype=int),
@@ -223,12 +225,12 @@ def level(
     if p - world * capacity < count[world]:
         x, j, phase = position[p], volume_ratio[p], phases[world, phase_of[p]]
         mean = mean_of_nodes(grid, world, x, False, table, nodes)
-        step = shifting * dt[world]
         by = wp.vec3(0.0, 0.0, 0.0)
         change = wp.min(DIFFUSION * dt[world] * phase.wave_speed * grid.inv_dx[0], 1.0) * (mean[0] - j)
         if held[p] == FREE:
-            change += wp.min(SETTLING * step * shear_rate(affine[p]), 1.0) * (mean[1] - j)
-            by = into_gaps(grid, tool, reach, world, phase, x, affine[p], step, j, table, moving)
+            change += wp.min(SETTLING * dt[world] * shear_rate(affine[p]), 1.0) * (mean[1] - j)
+            density, step = mass[p] / volume[p], shifting * dt[world]
+            by = into_gaps(grid, tool, reach, world, density, x, affine[p], step, j, table, moving)
         volume_ratio[p] = j + change
         shift[p] = by
 
@@ -268,8 +270,8 @@ class Held:
         some = [pool.capacity, pool.count]
         shares = [pool.position, pool.mass, pool.volume, pool.volume_ratio, pool.held, table, moving]
         scene.crew.launch(spread, pool.size, [self.grid, *some, *shares], [self.nodes])
-        flow = [scene.dt, scene.phases, pool.phase, pool.position, pool.affine, pool.held, self.shifting]
-        inputs = [self.grid, self.tool, self.reach, *some, *flow, table, self.nodes, moving]
+        flow = [scene.dt, scene.phases, pool.phase, pool.position, pool.affine, pool.mass, pool.volume, pool.held]
+        inputs = [self.grid, self.tool, self.reach, *some, *flow, self.shifting, table, self.nodes, moving]
         scene.crew.launch(level, pool.size, inputs, [pool.volume_ratio, self.shift])
 
     def footprint(self) -> dict[str, int]:
