@@ -58,9 +58,12 @@ class Clock:
         return Stream(self.scenario) if self.scenario.nozzle is not None else None
 
     @property
-    def bore(self) -> float:
-        """Radius of what feeds the stream [m]; nothing without one."""
-        return 0.0 if self.stream is None else 0.5 * self.stream.nozzle.diameter
+    def bore(self) -> tuple[float, float]:
+        """Radius of what feeds the stream, and how far it reaches down from where matter is let go [m]; nothing without
+        a stream."""
+        if self.stream is None:
+            return 0.0, 0.0
+        return 0.5 * self.stream.nozzle.diameter, self.stream.nozzle.rise
 
     def speed_at(self, radius: np.ndarray) -> np.ndarray:
         """Of the stream at radii [m] from its axis, while it extrudes [m/s]."""

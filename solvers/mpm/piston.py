@@ -40,6 +40,7 @@ class Piston:
     still: int  # 1 where it is asked by how much its nodes yield to what pushes: not at all
     walled: int  # 1 where the bore is that of a body
     bore: float  # radius [m]
+    rise: float  # of its upper end, where matter is let go, over the lower [m]
     speed: wp.array(dtype=float)  # of nodes while it extrudes, at equal steps of the radius squared up to WIDE [m/s]
     row: wp.array(dtype=int)  # of the end of the tick that substeps are in
     exit: wp.array(dtype=wp.vec3)
@@ -53,7 +54,7 @@ def piston_of(scene: Scene, dx: Sequence[float], firm: bool = False, still: bool
     for name in ("row", "exit", "drift", "feeding"):
         setattr(piston, name, getattr(clock.hours, name))
     piston.firm, piston.still, piston.walled = int(firm), int(still), int(scene.outline is not None)
-    piston.bore = clock.bore
+    piston.bore, piston.rise = clock.bore
     speed = np.zeros(1)
     if clock.stream is not None:
         piston.on = 1

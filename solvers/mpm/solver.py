@@ -284,7 +284,7 @@ class SolverMPM(Solver):
     def g2p(self) -> None:
         if self.held is not None:
             self.empty(self.held.nodes)
-            self.held.level(self.table, self.moving)
+            self.held.level(self.table, self.piston, self.moving)
         self.gather()
         if self.held is not None:
             homes = None if self.by_block is None else self.by_block.homes

@@ -14,8 +14,9 @@ velocity. What it leaves shows in the volume ratios, which drift apart from part
 the flow up; so they diffuse, as densities do in SPH: J += dt DIFFUSION c / dx (<J> - J), <J> that of the nodes. What
 they drift by together stays: along a bore matter came to be packed by up to a quarter more than its J told. Where there
 is no free surface matter shares its space, so there strain takes off what strain brings in: J += dt SETTLING
-|2 dev D| (<room> - J), less near free surfaces. (In proportion to strain, and by way of nodes: as particles pass nodes,
-their room flickers by some percent, and with a high speed of sound that is more than the pressure that drives them.)
+|2 dev D| (<room> - J), less near free surfaces, of which a bore has none. (In proportion to strain, and by way of
+nodes: as particles pass nodes, their room flickers by some percent, and with a high speed of sound that is more than
+the pressure that drives them.)
 
 Particles follow streamlines, and those nearest to a wall leave it where it turns: of what flows at s from the wall of a
 bore there is nothing nearer, and past the rim it flows at some 3 s from the face. No strain tells of the gap, and a
@@ -41,6 +42,7 @@ from .grid import Grid, first_node, node_at, node_parts, slots_of
 from .kernels_warp import sums_of
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
 from .particle import columns_scaled, contained, down_the_slope, inertia, kirchhoff, resistance_of, viscous, weights
+from .piston import REACHED, Piston
 
 wp.set_module_options({"enable_backward": False})
 
@@ -129,6 +131,14 @@ def keep_out(
 
 
 @wp.func
+def within_bore(grid: Grid, piston: Piston, x: wp.vec3):
+    """Whether a particle at x is in a bore, and reads no nodes below its exit."""
+    away = x - piston.exit[piston.row[0]]
+    beside = away[0] * away[0] + away[1] * away[1] < piston.bore * piston.bore
+    return beside and away[2] + piston.rise > REACHED * grid.dx[2]
+
+
+@wp.func
 def gathered(grid: Grid, world: int, x: wp.vec3, table: wp.array(dtype=int), moving: wp.array(dtype=wp.vec4)):
     """The sums over its nodes of a particle at x."""
     base = first_node(grid, x)
@@ -149,26 +159,29 @@ def into_gaps(
     c: wp.mat33,
     step: float,
     volume_ratio: float,
+    least: float,
     table: wp.array(dtype=int),
     moving: wp.array(dtype=wp.vec4),
 ):
-    """How far a free particle is shifted into a gap [m]: down the slope of the density where rho J < rho0."""
+    """How far a free particle is shifted into a gap [m]: down the slope of the density where rho J < rho0; where the
+    `least` full of its nodes says that a free surface is near, only towards the body."""
     by = wp.vec3(0.0, 0.0, 0.0)
     sums = gathered(grid, world, x, table, moving)
     crowding = sums[0, 3] * volume_ratio / density
     if crowding < 1.0:
         down = down_the_slope(grid, density, sums, c, step)
-        _room, least = room_of(grid, world, x, density, table, moving)
-        _image, fill, normal = mirrored(tool, x, reach)
         if least > HALF:
             by = down
-        elif fill > 0.0 and crowding > HALF:
-            by = wp.min(wp.dot(down, normal), 0.0) * normal
+        elif crowding > HALF:
+            _image, fill, normal = mirrored(tool, x, reach)
+            if fill > 0.0:
+                by = wp.min(wp.dot(down, normal), 0.0) * normal
     return by
 
 
 @wp.kernel
-def spread(
+def find_room(
+    share: wp.vec3i,
     grid: Grid,
     capacity: int,
     count: wp.array(dtype=int),
@@ -177,21 +190,46 @@ def spread(
     volume: wp.array(dtype=float),
     volume_ratio: wp.array(dtype=float),
     held: wp.array(dtype=int),
+    piston: Piston,
     table: wp.array(dtype=int),
     moving: wp.array(dtype=wp.vec4),
     # outputs
+    room: wp.array(dtype=wp.vec2),
+):
+    """(the room that a particle is to have, its own if nodes tell of none; how full the least of its nodes is). In a
+    bore there is room to the wall, however few nodes its images fill: a tip may be thinner than they reach."""
+    p = index_of(share, wp.tid())
+    world = p / capacity
+    if p - world * capacity < count[world]:
+        x, j = position[p], volume_ratio[p]
+        found = wp.vec2(j, 0.0)
+        if held[p] == FREE:
+            there, least = room_of(grid, world, x, mass[p] / volume[p], table, moving)
+            heard = wp.clamp((least - HALF) / (1.0 - HALF), 0.0, 1.0)
+            if within_bore(grid, piston, x):
+                heard = 1.0
+            found = wp.vec2(j + heard * (there - j), least)
+        room[p] = found
+
+
+@wp.kernel
+def spread(
+    grid: Grid,
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    volume: wp.array(dtype=float),
+    volume_ratio: wp.array(dtype=float),
+    room: wp.array(dtype=wp.vec2),
+    table: wp.array(dtype=int),
+    # outputs
     nodes: wp.array(dtype=wp.vec4),
 ):
-    """(sum of w V0 J, of w V0 times the room that there is away from free surfaces, -, sum of w V0) to nodes."""
+    """(sum of w V0 J, of w V0 times the room that particles are to have, -, sum of w V0) to nodes."""
     p = wp.tid()
     world = p / capacity
     if p - world * capacity < count[world]:
-        j = volume_ratio[p]
-        room = j
-        if held[p] == FREE:
-            share, least = room_of(grid, world, position[p], mass[p] / volume[p], table, moving)
-            room += wp.clamp((least - HALF) / (1.0 - HALF), 0.0, 1.0) * (share - j)
-        row = volume[p] * wp.vec4(j, room, 0.0, 1.0)
+        row = volume[p] * wp.vec4(volume_ratio[p], room[p][0], 0.0, 1.0)
         tell_nodes(grid, world, position[p], False, row, table, nodes)
 
 
@@ -212,6 +250,7 @@ def level(
     volume: wp.array(dtype=float),
     held: wp.array(dtype=int),
     shifting: float,
+    room: wp.array(dtype=wp.vec2),
     table: wp.array(dtype=int),
     nodes: wp.array(dtype=wp.vec4),
     moving: wp.array(dtype=wp.vec4),
@@ -230,7 +269,7 @@ def level(
         if held[p] == FREE:
             change += wp.min(SETTLING * dt[world] * shear_rate(affine[p]), 1.0) * (mean[1] - j)
             density, step = mass[p] / volume[p], shifting * dt[world]
-            by = into_gaps(grid, tool, reach, world, density, x, affine[p], step, j, table, moving)
+            by = into_gaps(grid, tool, reach, world, density, x, affine[p], step, j, room[p][1], table, moving)
         volume_ratio[p] = j + change
         shift[p] = by
 
@@ -245,6 +284,7 @@ class Held:
         self.tool = tool_of(scene, self.reach + scene.spacing)
         with wp.ScopedDevice(scene.device):
             self.nodes = wp.zeros(64 * slots, dtype=wp.vec4)
+            self.room = wp.zeros(pool.size, dtype=wp.vec2)
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self._nobody = wp.zeros(1, dtype=int)
 
@@ -264,15 +304,18 @@ class Held:
             [pool.position, table, block_of, active, outdated, pool.fault],
         )
 
-    def level(self, table: wp.array, moving: wp.array) -> None:
+    def level(self, table: wp.array, piston: Any, moving: wp.array) -> None:
         """Enqueue: volume ratios diffuse and settle, by way of `nodes`, which are empty; who is to be shifted."""
-        pool, scene = self.pool, self.scene
+        pool, scene, launch = self.pool, self.scene, self.scene.crew.launch
         some = [pool.capacity, pool.count]
-        shares = [pool.position, pool.mass, pool.volume, pool.volume_ratio, pool.held, table, moving]
-        scene.crew.launch(spread, pool.size, [self.grid, *some, *shares], [self.nodes])
+        whole = [pool.position, pool.mass, pool.volume, pool.volume_ratio, pool.held, piston, table, moving]
+        launch(find_room, pool.size, [self.grid, *some, *whole], [self.room])
+        shares = [pool.position, pool.volume, pool.volume_ratio, self.room, table]
+        launch(spread, pool.size, [self.grid, *some, *shares], [self.nodes])
         flow = [scene.dt, scene.phases, pool.phase, pool.position, pool.affine, pool.mass, pool.volume, pool.held]
-        inputs = [self.grid, self.tool, self.reach, *some, *flow, self.shifting, table, self.nodes, moving]
-        scene.crew.launch(level, pool.size, inputs, [pool.volume_ratio, self.shift])
+        inputs = [self.grid, self.tool, self.reach, *some, *flow, self.shifting, self.room, table, self.nodes, moving]
+        launch(level, pool.size, inputs, [pool.volume_ratio, self.shift])
 
     def footprint(self) -> dict[str, int]:
-        return {"tool.nodes": self.nodes.capacity, "tool.shift": self.shift.capacity} | table_of(self.tool)
+        names = ("nodes", "room", "shift")
+        return {f"tool.{name}": getattr(self, name).capacity for name in names} | table_of(self.tool)

@@ -158,7 +158,7 @@ def levelled(sim, start, strain=0.0):
     sim.pool.affine.assign(affine)
     for _ in range(STEPS):
         solver.empty(solver.held.nodes)
-        solver.held.level(solver.table, solver.moving)
+        solver.held.level(solver.table, solver.piston, solver.moving)
     return ratio.numpy()[:n].copy()
 
 
@@ -183,6 +183,22 @@ def test_volume_ratios_diffuse_and_their_mean_stays_but_what_is_strained_takes_i
     assert np.exp(-32.0 * 0.02) < np.mean(1.0 - begun) / 0.2 < np.exp(-16.0 * 0.02)
 
 
+def test_a_bore_settles_however_few_cells_its_wall_is_thick():
+    """Two: nodes deeper in it than the images of matter reach are empty, as if matter had a free surface there."""
+    sim = Simulation(strand(numerics={"mpm": {"grid_ratio": 1.5}}), "mpm")
+    sim.begin()
+    sim.scene.set_dt(STEP)
+    for name in ("clear_grid", "p2g", "grid_step"):
+        getattr(sim.solver, name)()
+    n, frame, cell = sim.pool.counts[0], sim.frame(), sim.solver.grid.dx[2]
+    above = frame["position"][:, 2] - sim.scenario.nozzle.standoff
+    deep = (frame["held"] != CARRIED) & (above > 1.6 * cell)
+    before = np.full(n, 0.8)
+    assert levelled(sim, before)[deep] == pytest.approx(0.8, abs=1e-3)
+    assert (levelled(sim, before, 2.0)[deep] > 0.9).all()
+    assert (sim.solver.held.room.numpy()[:n, 1][deep] < 0.5).any()  # of what is full by its nodes alone
+
+
 def test_a_gap_beside_the_face_is_filled_as_matter_is_strained():
     """Matter whose top lies half a cell too low under the face; not at rest, and nothing goes down."""
     top = D - 0.5 * SPACING
@@ -201,7 +217,7 @@ def test_a_gap_beside_the_face_is_filled_as_matter_is_strained():
         affine[:, 0, 2] = rate
         sim.pool.affine.assign(affine)
         sim.solver.empty(held.nodes)
-        held.level(sim.solver.table, sim.solver.moving)
+        held.level(sim.solver.table, sim.solver.piston, sim.solver.moving)
         shift = held.shift.numpy()[: len(place)][under]
         assert (shift[:, 2] > 0.0).all() if rate > 0.0 else (shift == 0.0).all()
 
