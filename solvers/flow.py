@@ -70,6 +70,24 @@ def strained(
 
 
 @wp.func
+def flows(
+    phase: Phase,
+    l: wp.mat33,
+    b: wp.vec3,
+    s: wp.vec3,
+    h: float,
+    i: int,
+    plastic: wp.array(dtype=float),
+):
+    """Whether particle i is a liquid's, or would yield in a step as it is."""
+    flowing = phase.shear_modulus <= 0.0 or phase.relaxation_rate > 0.0
+    if not flowing:
+        _b, _s, kept = advanced(phase, phase.shear_modulus, threshold_of(phase, i, plastic), l, b, s, h)
+        flowing = kept < 1.0
+    return flowing
+
+
+@wp.func
 def shear_rate(l: wp.mat33):
     """sqrt(2 dev D : dev D) [1/s] of a velocity gradient."""
     d = 0.5 * (l + wp.transpose(l))

@@ -15,8 +15,8 @@ class ConfigMPM(Config):
     advection: Annotated[float, Field(gt=0, lt=1.0)] = Field(0.5, description="cells that matter may cross in a step")
     shifting: Annotated[float, Field(ge=0)] = Field(
         8.0,
-        description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2; beside a body "
-        "into gaps, too",
+        description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2, and volume ratios "
+        "settle towards the room that there is; beside a body shifting goes into gaps, too",
     )
     separation: Annotated[float, Field(ge=0)] = Field(
         0.5, description="shift of particles that are too near each other, over strain and crowding"

@@ -77,12 +77,14 @@ def room_of(
     grid: Grid, world: int, x: wp.vec3, density: float, table: wp.array(dtype=int), moving: wp.array(dtype=wp.vec4)
 ):
     """(the volume ratio of matter of a rest density [kg/m^3] at x that shares the space of its nodes, whose densities
-    come fourth: sum w rho0 / rho; the least of rho / rho0). All particles together then take the space of all nodes,
-    however they lie (the mean of rho itself is too high where they are in disorder). What a clamp holds is full."""
+    come fourth: sum w rho0 / rho; the least of rho / rho0; its slope, |dx grad|). All particles together then take the
+    space of all nodes, however they lie (the mean of rho itself is too high where they are in disorder). What a clamp
+    holds is full."""
     base = first_node(grid, x)
-    _f, wx, wy, wz = weights(grid, x, base)
+    f, wx, wy, wz = weights(grid, x, base)
     room = float(0.0)
     least = PACKED
+    slope = wp.vec3(0.0, 0.0, 0.0)
     for o in range(3):
         for q in range(3):
             for r in range(3):
@@ -94,8 +96,10 @@ def room_of(
                 if full > ANCHORED:
                     full = 1.0
                 least = wp.min(least, full)
-                room += wx[o] * wy[q] * wz[r] / wp.max(full, 1.0 / PACKED)
-    return room, least
+                w = wx[o] * wy[q] * wz[r]
+                room += w / wp.max(full, 1.0 / PACKED)
+                slope += (4.0 * w * full) * (wp.vec3(float(o), float(q), float(r)) - f)
+    return room, least, wp.length(slope)
 
 
 @wp.func

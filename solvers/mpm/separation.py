@@ -26,7 +26,7 @@ from ..bind import warp_func
 from ..cells import Cells, WhoIsWhere, bucket_of, cell_of, place
 from ..corrected import enclosed, least_eigenvalue
 from ..crowding import CLOSE, excess, nearest, out_of_crowd
-from ..flow import advanced, shear_rate, threshold_of
+from ..flow import flows, shear_rate
 from ..images import face_kind, has_choice, image_position, near_faces, undoing
 from ..pairs import floats
 from ..search import around
@@ -125,14 +125,8 @@ def separate(
     if i - world * capacity < count[world]:
         found = wp.vec4(0.0, 0.0, 0.0, 0.0)
         phase = phases[world, phase_of[i]]
-        flows = phase.shear_modulus <= 0.0 or phase.relaxation_rate > 0.0
-        if not flows:
-            limit = threshold_of(phase, i, plastic)
-            _b, _s, kept = advanced(
-                phase, phase.shear_modulus, limit, affine[i], elastic_normal[i], elastic_shear[i], dt[world]
-            )
-            flows = kept < 1.0
-        if held[i] == FREE and flows:
+        flowing = flows(phase, affine[i], elastic_normal[i], elastic_shear[i], dt[world], i, plastic)
+        if held[i] == FREE and flowing:
             x = position[i]
             near = near_faces(box, x, cells.width, True)
             walled = near_faces(box, x, cells.width, False)

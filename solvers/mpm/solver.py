@@ -36,6 +36,7 @@ from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
 from .piston import piston_of
 from .pressed import roughly_pressed, unpressed
 from .separation import EVERY, Separation
+from .settling import Settling
 from .tool import Held
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
@@ -141,7 +142,9 @@ class SolverMPM(Solver):
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
         apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
-        self.arranges = EVERY if apart else 0
+        settles = config.shifting > 0.0 and self.held is None
+        self.settling = Settling(scene, pool, self.grid, self.strains[-1], EVERY * config.shifting) if settles else None
+        self.arranges = EVERY if apart or settles else 0
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
 
@@ -184,9 +187,11 @@ class SolverMPM(Solver):
         wp.copy(self.pool.velocity, velocity)
 
     def arrange(self) -> None:
-        assert self.separation is not None
-        homes = None if self.by_block is None else self.by_block.homes
-        self.separation.part(self.table, self.block_of, self.active, self.raw, self.node_lanes, homes)
+        if self.separation is not None:
+            homes = None if self.by_block is None else self.by_block.homes
+            self.separation.part(self.table, self.block_of, self.active, self.raw, self.node_lanes, homes)
+        if self.settling is not None:
+            self.settling.settle(self.table, self.active, self.raw, self.node_lanes)
 
     def substep(self) -> None:
         if self.scene.grows:
@@ -332,6 +337,8 @@ class SolverMPM(Solver):
         self.backend.prepare(self)
         if self.separation is not None:
             self.separation.prepare()
+        if self.settling is not None:
+            self.settling.prepare()
         if self.by_block is not None:
             self.by_block.prepare()
         self.started = False

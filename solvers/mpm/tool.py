@@ -204,7 +204,7 @@ def find_room(
         x, j = position[p], volume_ratio[p]
         found = wp.vec2(j, 0.0)
         if held[p] == FREE:
-            there, least = room_of(grid, world, x, mass[p] / volume[p], table, moving)
+            there, least, _slope = room_of(grid, world, x, mass[p] / volume[p], table, moving)
             heard = wp.clamp((least - HALF) / (1.0 - HALF), 0.0, 1.0)
             if within_bore(grid, piston, x):
                 heard = 1.0

@@ -23,7 +23,7 @@ def ask(
     found: wp.array(dtype=wp.vec2),
 ):
     p = wp.tid()
-    room, least = room_of(grid, 0, position[p], density, table, moving)
+    room, least, _slope = room_of(grid, 0, position[p], density, table, moving)
     found[p] = wp.vec2(room, least)
 
 
