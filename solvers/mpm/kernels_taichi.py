@@ -4,7 +4,7 @@ import functools
 from collections.abc import Callable
 from types import SimpleNamespace
 
-from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.method.frame import CARRIED, FREE
 from fluidbench.native.pool import FAULT_ASTRAY
 
 from ..flow_taichi import pressure, shear_rate, strained
@@ -51,7 +51,7 @@ from .grid_taichi import (
     touched,
     wrapped,
 )
-from .particle import ANCHOR, ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
+from .particle import ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
 from .piston import BELOW, FINE, WIDE, Piston
 
 spline = taichi_func(quadratic_spline)
@@ -221,13 +221,9 @@ def passes(alone: bool) -> SimpleNamespace:
             if p - world * capacity < count[world]:
                 h, c = dt[world], affine[p]
                 phase = phase_at(phases, world, phase_of[p])
-                inertia = mass[p]
-                heavy = held[p] == CLAMPED
-                if heavy:
-                    inertia *= ANCHOR
                 a = mat3(0.0)  # momentum per distance from the particle
                 if held[p] == FREE:
-                    a = inertia * c
+                    a = mass[p] * c
                 j, b, s = volume_ratio[p], elastic_normal[p], elastic_shear[p]
                 if held[p] != CARRIED and h > 0.0:
                     t = c.trace()
@@ -245,7 +241,7 @@ def passes(alone: bool) -> SimpleNamespace:
                 base = base_node(grid, position[p])
                 f = (position[p] - grid.origin) * grid.inv_dx - base
                 w = weights(f)
-                own = inertia * velocity[p]
+                own = mass[p] * velocity[p]
                 for o, q in ti.ndrange(3, 3):
                     for r in ti.static(range(3)):
                         at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
@@ -254,7 +250,7 @@ def passes(alone: bool) -> SimpleNamespace:
                         else:
                             share = w[0, o] * w[1, q] * w[2, r]
                             momentum = share * (own + a @ ((vec3(o, q, r) - f) * grid.dx))
-                            add(raw, at, vec4(momentum[0], momentum[1], momentum[2], share * inertia))
+                            add(raw, at, vec4(momentum[0], momentum[1], momentum[2], share * mass[p]))
 
     @ti.kernel
     def grid_step(

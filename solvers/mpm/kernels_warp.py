@@ -24,7 +24,7 @@ from .grid import (
     slots_of,
     turns,
 )
-from .particle import FAULT_STENCIL, affine_of, inertia, moved, shifted, stressed, taken, weights
+from .particle import FAULT_STENCIL, affine_of, moved, shifted, stressed, taken, weights
 from .piston import Piston, driven
 from .together import scatter_together, stencil
 from .walls import facing, folded, in_front, in_reach, near_any, rubbed_by_walls, seen, touched, unbound
@@ -67,7 +67,7 @@ def p2g(
             return
         p = world * capacity  # threads of a warp stay together: this one computes, but writes nothing
     phase = phases[world, phase_of[p]]
-    m = inertia(mass[p], held[p])
+    m = mass[p]
     a = stressed(
         grid,
         dt[world],

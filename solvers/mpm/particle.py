@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from fluidbench.method.frame import CARRIED, CLAMPED, FREE
+from fluidbench.method.frame import CARRIED, FREE
 from fluidbench.native.crew import raise_fault
 from fluidbench.native.pool import FAULT_ASTRAY
 from fluidbench.native.scene import Phase, is_solid, too_fast
@@ -18,11 +18,8 @@ spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
 # How viscosity is taken in a step, `drags`: solved for; as a stress; the same, where what is carried is stressed, too.
 IMPLICIT, EXPLICIT, PRESSED = wp.constant(0), wp.constant(1), wp.constant(2)
-# Inertia of clamped particles over their own. A clamp that weighs no more than what it holds only brakes the nodes that
-# they share: a beam falls slowly off it.
-ANCHOR = wp.constant(1.0e4)
 STEEPEST = wp.constant(1.0 / 6.0)  # D dt / dx^2 up to which explicit diffusion is stable in three dimensions
-ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make [-]
+ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make (clamp.py) [-]
 PACKED = wp.constant(2.0)  # volume ratio, or one over it, beyond which nothing is let go [-]
 
 
@@ -85,12 +82,6 @@ def weights(grid: Grid, x: wp.vec3, base: wp.vec3i):
     wy0, wy1, wy2 = spline(f[1])
     wz0, wz1, wz2 = spline(f[2])
     return f, wp.vec3(wx0, wx1, wx2), wp.vec3(wy0, wy1, wy2), wp.vec3(wz0, wz1, wz2)
-
-
-@wp.func
-def inertia(mass: float, held: int):
-    """With which a particle takes part in the momentum of its nodes [kg]."""
-    return wp.where(held == CLAMPED, ANCHOR * mass, mass)
 
 
 @wp.func

@@ -12,7 +12,7 @@ from fluidbench.native.scene import Phase
 
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
-from .particle import affine_of, inertia, moved, resistance_of, shifted, stressed, taken, viscous, weights
+from .particle import affine_of, moved, resistance_of, shifted, stressed, taken, viscous, weights
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -155,7 +155,7 @@ def scatter(
             p = homes.members[member]
             world = p / capacity
             phase = phases[world, phase_of[p]]
-            m = inertia(mass[p], held[p])
+            m = mass[p]
             a = stressed(
                 grid,
                 dt[world],

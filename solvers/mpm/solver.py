@@ -29,6 +29,7 @@ from ..viscosity import decided
 from . import kernels_warp as kernels
 from .bounds import bounds_of
 from .by_block import ByBlock
+from .clamp import Clamps
 from .config import ConfigMPM
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, grid_of
 from .implicit import GridViscosity
@@ -139,6 +140,8 @@ class SolverMPM(Solver):
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
         self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots, self.shifting)
+        clamps = any(body.clamped for scenario in scene.scenarios for body in scenario.bodies)
+        self.clamps = Clamps(scene, pool, self.grid) if clamps else None
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
         apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
@@ -232,6 +235,8 @@ class SolverMPM(Solver):
         self.give(dt, drags, raw)
         if self.held is not None:
             self.held.reflect(dt, self.table, raw)
+        if self.clamps is not None:
+            self.clamps.hold(self.table, raw)
 
     def give(self, dt: wp.array, drags: int, raw: wp.array) -> None:
         """The same, of particles themselves."""
@@ -339,6 +344,8 @@ class SolverMPM(Solver):
             self.separation.prepare()
         if self.settling is not None:
             self.settling.prepare()
+        if self.clamps is not None:
+            self.clamps.prepare()
         if self.by_block is not None:
             self.by_block.prepare()
         self.started = False

@@ -41,7 +41,7 @@ from ..tool import Tool, mirrored, outside, table_of, tool_of
 from .grid import Grid, first_node, node_at, node_parts, slots_of
 from .kernels_warp import sums_of
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
-from .particle import columns_scaled, contained, down_the_slope, inertia, kirchhoff, resistance_of, viscous, weights
+from .particle import columns_scaled, contained, down_the_slope, kirchhoff, resistance_of, viscous, weights
 from .piston import REACHED, Piston
 
 wp.set_module_options({"enable_backward": False})
@@ -80,7 +80,7 @@ def reflect(
         x, fill, normal = mirrored(tool, position[p], reach)
         if fill > 0.0:
             phase = phases[world, phase_of[p]]
-            m = fill * inertia(mass[p], held[p])
+            m = fill * mass[p]
             turned = affine[p] - 2.0 * wp.outer(affine[p] * normal, normal)
             v = 2.0 * tool.pose.velocity[0] - velocity[p]
             a = wp.mat33()
