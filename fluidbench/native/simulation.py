@@ -161,7 +161,7 @@ class Simulation(Session):
         """The audit, what happens to the material, and the substeps: replayed, but the first time in a process and
         where births need the host."""
         on_cpu, births = self.scene.device.is_cpu, self._births_due()
-        arranging = self.solver.arranges > 0 and self.done % self.solver.arranges == 0
+        turn = self._turn()
         audited, self.unseen = self.unseen or on_cpu, False  # on a GPU what nobody has looked at since is ours
         if not self._use_graphs or self.aged == 0 or births:
             if audited:
@@ -171,13 +171,13 @@ class Simulation(Session):
             self.scene.clock.struck()
             self._refresh()
             self.scene.set_dt(steps.dt)
-            if arranging:
+            if turn >= 0:
                 self._wait()
-                self.solver.arrange()
+                self.solver.arrange(turn)
             self._run(steps.substeps)
             return
         self.scene.set_dt(steps.dt)
-        first = audited, feeding, self.pool.stale, arranging
+        first = audited, feeding, self.pool.stale, turn
         self.pool.stale = False
         if on_cpu:  # where replay is free
             start = self.scene.crew.recorded(first, lambda: self._start_tick(*first))
@@ -187,7 +187,12 @@ class Simulation(Session):
             self.scene.crew.replay([(self.scene.crew.recorded(whole, lambda: self._whole_tick(*whole)), 1)])
         self.scene.clock.struck()
 
-    def _start_tick(self, audited: bool, feeding: bool, stale: bool, arranging: bool) -> None:
+    def _turn(self) -> int:
+        """Of arranging, due at the start of a tick; -1 if it is not."""
+        every = self.solver.arranges
+        return self.done // every % self.solver.turns if every > 0 and self.done % every == 0 else -1
+
+    def _start_tick(self, audited: bool, feeding: bool, stale: bool, turn: int) -> None:
         """Enqueue all of a tick but its substeps."""
         if audited:
             self.health.audit()
@@ -195,11 +200,11 @@ class Simulation(Session):
         self.scene.clock.strike()
         if stale:
             self.solver.refresh()
-        if arranging:
-            self.solver.arrange()
+        if turn >= 0:
+            self.solver.arrange(turn)
 
-    def _whole_tick(self, audited: bool, feeding: bool, stale: bool, arranging: bool, substeps: int) -> None:
-        self._start_tick(audited, feeding, stale, arranging)
+    def _whole_tick(self, audited: bool, feeding: bool, stale: bool, turn: int, substeps: int) -> None:
+        self._start_tick(audited, feeding, stale, turn)
         for _ in range(substeps):
             self._substep()
 

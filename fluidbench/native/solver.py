@@ -24,6 +24,7 @@ class Solver(Method):
     passes: ClassVar[tuple[str, ...]]
     faults: ClassVar[dict[int, str]] = {}
     arranges: int = 0  # ticks from one call of `arrange` to the next; 0 for never
+    turns: int = 1  # calls of `arrange` until it does the same again
     backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
 
     @classmethod
@@ -63,9 +64,9 @@ class Solver(Method):
         """Enqueue what must follow when particles have appeared, moved in memory or were moved: between substeps, the
         first time outside any graph, later recorded like `substep`."""
 
-    def arrange(self) -> None:
+    def arrange(self, turn: int) -> None:
         """Enqueue, every `arranges` ticks before their substeps and recorded like them: particles into a better order,
-        which is no motion of matter."""
+        which is no motion of matter. `turn` counts the calls, from 0 to `turns` - 1 and again."""
 
     def settle(self) -> None:
         """Enqueue, between substeps and recorded like them, when parents have had children, which lie over others. A

@@ -2,7 +2,7 @@
 
 What rolls over at a front stays a few tenths of a cell above the floor, and the gap is carried on beneath what follows;
 volume ratios, which come of strain, call full what is porous. A puddle 5 to 15 % too thick is pushed out by the weight
-of air. So every few ticks, where matter flows, J goes towards the room that there is, at the rate at which crowds part:
+of air. So every sixteenth tick, where matter flows, J goes towards the room that there is, as fast as crowds part:
 
     J += min(shifting |2 dev D| dt, 1) heard (room - J -+ margin)      where |room - J| > margin
     room = sum of w / phi, phi the share of a node's space that V0 fills
@@ -28,6 +28,7 @@ from .nodes import room_of, tell_nodes
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
+TURNS = 4  # of separation for one of settling, which costs as much as a substep
 COMPRESSED = wp.constant(0.02)  # of J: twice what a sound speed of ten times the flow's leaves
 SURFACE = wp.constant(0.9)  # what a flat free surface lacks at most, over |dx grad(phi)|
 

@@ -37,7 +37,7 @@ from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
 from .piston import piston_of
 from .pressed import roughly_pressed, unpressed
 from .separation import EVERY, Separation
-from .settling import Settling
+from .settling import TURNS, Settling
 from .tool import Held
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
@@ -146,8 +146,9 @@ class SolverMPM(Solver):
         apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
         settles = config.shifting > 0.0 and self.held is None
-        self.settling = Settling(scene, pool, self.grid, self.strains[-1], EVERY * config.shifting) if settles else None
-        self.arranges = EVERY if apart or settles else 0
+        rate = TURNS * EVERY * config.shifting
+        self.settling = Settling(scene, pool, self.grid, self.strains[-1], rate) if settles else None
+        self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
 
@@ -189,11 +190,11 @@ class SolverMPM(Solver):
         self.backend.wait()
         wp.copy(self.pool.velocity, velocity)
 
-    def arrange(self) -> None:
+    def arrange(self, turn: int) -> None:
         if self.separation is not None:
             homes = None if self.by_block is None else self.by_block.homes
             self.separation.part(self.table, self.block_of, self.active, self.raw, self.node_lanes, homes)
-        if self.settling is not None:
+        if self.settling is not None and turn == 0:
             self.settling.settle(self.table, self.active, self.raw, self.node_lanes)
 
     def substep(self) -> None:

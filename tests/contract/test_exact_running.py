@@ -239,18 +239,18 @@ def test_launches_are_captured_or_waited_for():
     captured.advance_tick()
     assert list(captured.scene.crew.graphs) == ["audit", 1] and captured._use_graphs
     captured.advance_tick()
-    assert list(captured.scene.crew.graphs) == ["audit", 1, (True, False, False, False)]
+    assert list(captured.scene.crew.graphs) == ["audit", 1, (True, False, False, -1)]
 
 
 @pytest.mark.parametrize("graphs", [True, False])
 def test_particles_are_arranged_every_so_many_ticks_of_the_run(graphs):
-    """At ticks 0, 3, 6; and a run that goes on at tick 4 does it next at 6."""
+    """At ticks 0, 3, 6, by turns; and a run that goes on at tick 4 does it next at 6."""
 
     class Arranging(Stepping):
-        dt, arranges = 9.0, 3
+        dt, arranges, turns = 9.0, 3, 2
 
-        def arrange(self):
-            self.pool.birth_time.fill_(7.0)
+        def arrange(self, turn):
+            self.pool.birth_time.fill_(7.0 + turn)
 
     def arranged(done, until):
         sim, at = Simulation(scenario(**FALLING), Arranging, graphs=graphs), []
@@ -260,11 +260,12 @@ def test_particles_are_arranged_every_so_many_ticks_of_the_run(graphs):
         while sim.done < until:
             sim.pool.birth_time.fill_(0.0)
             sim.advance_tick()
-            if sim.pool.birth_time.numpy()[0] == 7.0:
-                at.append(sim.done - 1)
+            turn = int(sim.pool.birth_time.numpy()[0]) - 7
+            if turn >= 0:
+                at.append((sim.done - 1, turn))
         return at
 
-    assert arranged(0, 8) == [0, 3, 6] and arranged(4, 8) == [6]
+    assert arranged(0, 8) == [(0, 0), (3, 1), (6, 0)] and arranged(4, 8) == [(6, 0)]
 
 
 def test_layers_come_at_their_time_and_carry_no_spin():

@@ -43,7 +43,7 @@ def moves(sim, times=1):
     """How far each particle is shifted [m]."""
     before = sim.pool.snapshot()["position"].astype(float)
     for _ in range(times):
-        sim.solver.arrange()
+        sim.solver.arrange(1)
     assert not sim.pool.fault.numpy().any()
     return sim.pool.snapshot()["position"].astype(float) - before
 
@@ -182,4 +182,5 @@ def test_those_beyond_a_periodic_face_crowd_too(axis):
 
 
 def test_it_can_be_switched_off_and_is_off_where_matter_expands():
-    assert cube(separation=0.0).solver.arranges == 0 and cube().solver.arranges == EVERY
+    assert cube(separation=0.0).solver.separation is None and cube().solver.arranges == EVERY
+    assert cube(separation=0.0, shifting=0.0).solver.arranges == 0
