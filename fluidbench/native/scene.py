@@ -152,6 +152,11 @@ class Scene:
         return self._any(lambda m: m.youngs_modulus is not None)
 
     @property
+    def flows(self) -> bool:
+        """Whether anything may flow, now or later."""
+        return self._any(lambda m: not m.is_solid)
+
+    @property
     def viscous(self) -> bool:
         """Whether anything has Newtonian viscosity, now or later."""
         return self._any(lambda m: m.viscosity > 0)

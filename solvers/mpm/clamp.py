@@ -3,7 +3,8 @@
 A clamp that weighs no more than what it holds only brakes the nodes that they share: a beam falls slowly off it. A node
 in its hands is still, however little of it is the clamp's, and quadratic splines bend from half a cell before their
 last node that is still on. Nodes lie anywhere: those up to one cell in front of a face hold a beam by the face in the
-mean, those up to the 1.5 cells that splines reach by half a cell in front of it.
+mean, those up to the 1.5 cells that splines reach by half a cell in front of it. A rigid body (tool.py) sees of a clamp
+what it sees of other matter.
 """
 
 import warp as wp

@@ -6,12 +6,13 @@ of air. So every sixteenth tick, where matter flows, J goes towards the room tha
 
     J += min(shifting |2 dev D| dt, 1) heard (room - J -+ margin)      where |room - J| > margin
     room = sum of w / phi, phi the share of a node's space that V0 fills
-    heard = max(2 min(phi) - 1, 0): nothing beside a free surface, whose nodes are half full
-    margin = 0.02 + 0.9 |dx grad(phi)|
+    heard = 2 min(phi) - 1 within 0 and 1: nothing beside a free surface, whose nodes are half full
+    margin = 0.02 max((2 / r)^1.5, 1) + 0.9 |dx grad(phi)|, r the grid ratio
 
 What is porous so carries no pressure, and what lies on it presses it together. The margin leaves alone what is known to
-be full: weakly compressible matter may be 1 % denser than at rest, and what lies below a flat free surface lacks, by
-the two splines between a particle and its neighbours, at most 0.5 / 0.564 of what its slope tells.
+be full: weakly compressible matter may be 1 % denser than at rest; what a node tells scatters the more, the fewer
+particles share it; and what lies below a flat free surface lacks, by the two splines between a particle and its
+neighbours, at most 0.5 / 0.564 of what its slope tells. V0 has grown where matter has: this holds for foam, too.
 """
 
 import warp as wp
@@ -29,7 +30,7 @@ from .nodes import room_of, tell_nodes
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 TURNS = 4  # of separation for one of settling, which costs as much as a substep
-COMPRESSED = wp.constant(0.02)  # of J: twice what a sound speed of ten times the flow's leaves
+COMPRESSED = 0.02  # of J: twice what a sound speed of ten times the flow's leaves
 SURFACE = wp.constant(0.9)  # what a flat free surface lacks at most, over |dx grad(phi)|
 
 
@@ -57,6 +58,7 @@ def settle(
     share: wp.vec3i,
     grid: Grid,
     rate: float,
+    compressed: float,
     capacity: int,
     count: wp.array(dtype=int),
     phases: wp.array2d(dtype=Phase),
@@ -74,7 +76,7 @@ def settle(
     volume_ratio: wp.array(dtype=float),
 ):
     """Volume ratios of free particles that flow towards their room; `rate` is that of settling, over shear, times the
-    time since the last call [s]."""
+    time between calls [s], `compressed` the margin of what has no slope."""
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world] and held[p] == FREE:
@@ -82,9 +84,9 @@ def settle(
         if flows(phase, affine[p], elastic_normal[p], elastic_shear[p], dt[world], p, plastic):
             room, least, slope = room_of(grid, world, position[p], 1.0, table, nodes)
             lacking = room - volume_ratio[p]
-            margin = COMPRESSED + SURFACE * slope
-            heard = wp.max(2.0 * least - 1.0, 0.0) * wp.min(rate * shear_rate(affine[p]), 1.0)
-            volume_ratio[p] = volume_ratio[p] + wp.min(heard, 1.0) * (lacking - wp.clamp(lacking, -margin, margin))
+            margin = compressed + SURFACE * slope
+            heard = wp.clamp(2.0 * least - 1.0, 0.0, 1.0) * wp.min(rate * shear_rate(affine[p]), 1.0)
+            volume_ratio[p] = volume_ratio[p] + heard * (lacking - wp.clamp(lacking, -margin, margin))
 
 
 class Settling:
@@ -95,6 +97,7 @@ class Settling:
         self.scene, self.pool, self.grid = scene, pool, grid
         self.elastic = [pool.elastic_normal, pool.elastic_shear, plastic]
         self.rate = rate * scene.clock.tick
+        self.compressed = COMPRESSED * max(2.0 * scene.spacing / min(grid.dx), 1.0) ** 1.5
         self.backend = Warp(scene.crew)
 
     def prepare(self) -> None:
@@ -108,5 +111,5 @@ class Settling:
         matter = [pool.phase, pool.held, pool.position, pool.affine, *self.elastic, scene.dt]
         launch(clear_grid, lanes, [active, lanes], [nodes])
         launch(fill, pool.size, [self.grid, *some, pool.position, pool.volume, table], [nodes])
-        inputs = [self.grid, self.rate, *some, scene.phases, *matter, table, nodes]
+        inputs = [self.grid, self.rate, self.compressed, *some, scene.phases, *matter, table, nodes]
         launch(settle, pool.size, inputs, [pool.volume_ratio])

@@ -145,7 +145,7 @@ class SolverMPM(Solver):
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
         apart = config.separation > 0.0 and self.held is None
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
-        settles = config.shifting > 0.0 and self.held is None
+        settles = config.shifting > 0.0 and self.held is None and scene.flows
         rate = TURNS * EVERY * config.shifting
         self.settling = Settling(scene, pool, self.grid, self.strains[-1], rate) if settles else None
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
@@ -194,7 +194,7 @@ class SolverMPM(Solver):
         if self.separation is not None:
             homes = None if self.by_block is None else self.by_block.homes
             self.separation.part(self.table, self.block_of, self.active, self.raw, self.node_lanes, homes)
-        if self.settling is not None and turn == 0:
+        if self.settling is not None and turn == TURNS - 1:
             self.settling.settle(self.table, self.active, self.raw, self.node_lanes)
 
     def substep(self) -> None:
@@ -340,13 +340,10 @@ class SolverMPM(Solver):
         if self.scene.changes:
             self.scene.crew.load(aging)
         self.order.prepare()
+        for part in (self.clamps, self.separation, self.settling):
+            if part is not None:
+                part.prepare()
         self.backend.prepare(self)
-        if self.separation is not None:
-            self.separation.prepare()
-        if self.settling is not None:
-            self.settling.prepare()
-        if self.clamps is not None:
-            self.clamps.prepare()
         if self.by_block is not None:
             self.by_block.prepare()
         self.started = False

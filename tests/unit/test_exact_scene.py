@@ -133,6 +133,7 @@ def test_what_a_scene_says_of_its_material(kind):
     scene = Scene(scenario(material=material))
     every = ("elastic", "viscous", "cures", "grows", "expands", "changes")
     assert tuple(name for name in every if getattr(scene, name)) == true
+    assert scene.flows == (kind != "solid")
     assert Scene([scenario(), scenario(material=KINDS["oil"][0])]).viscous and scene.lanes == 1
 
 
