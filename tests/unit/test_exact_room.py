@@ -62,7 +62,7 @@ def test_a_lattice_has_its_own_space_and_walls_mirror_it(walls):
 
 
 def test_nodes_that_a_clamp_holds_are_full_and_lighter_ones_leave_room():
-    """Inertia of clamps is 1e4 times their own (particle.py). Of the weights of particles a quarter of a cell from a
+    """Inertia of clamps is 1e4 times their own (clamp.py). Of the weights of particles a quarter of a cell from a
     node 11/16 are on that, the others on its neighbours, of which one in two is light."""
 
     def still(n):
