@@ -33,12 +33,17 @@ class ConfigSPH(Config):
     hourglass: NonNegative = Field(
         2.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows"
     )
-    shifting: NonNegative = Field(4.0, description="shift out of a crowd, over strain and h^2 times its gradient")
+    shifting: NonNegative = Field(
+        4.0,
+        description="shift out of a crowd, over strain and h^2 times its gradient; rate of settling, over shear",
+    )
     density_feedback: NonNegative = Field(
         0.05,
-        description="rate, in c / h, at which integrated density follows the summed one, in what flows or has grown",
+        description="rate, in c / h, at which integrated density follows the summed one where it is crowded",
     )
-    density_tolerance: NonNegative = Field(0.03, description="gap between the two that is left alone, over the density")
+    density_tolerance: NonNegative = Field(
+        0.12, description="gap between the two that is left alone where they settle, over what disorder feigns"
+    )
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
 
     def alpha(self, material: Material) -> float:

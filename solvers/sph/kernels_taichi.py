@@ -26,15 +26,17 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_taichi import force_pass
+from .settling_taichi import settle, tell
 from .strain_taichi import strain_pass
 
 
 @functools.cache
-def passes(strength: bool, tensile: bool, viscous: bool, changing: bool) -> SimpleNamespace:
-    """All passes, for materials with or without shear stiffness, tension, viscosity, and parameters or rest densities
-    that differ between particles."""
+def passes(strength: bool, tensile: bool, viscous: bool, changing: bool, settling: bool) -> SimpleNamespace:
+    """All passes, for materials with or without shear stiffness, tension, viscosity, parameters or rest densities that
+    differ between particles, and anything that settles."""
     strain, force = strain_pass(strength, tensile, changing), force_pass(strength, tensile, viscous, changing)
-    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move)
+    more = {"tell": tell, "settle": settle} if settling else {}
+    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **more)
 
 
 @ti.kernel

@@ -1,8 +1,9 @@
 """Weakly compressible SPH in Warp: continuity density, delta-SPH diffusion, the common material law.
 
 One substep: lists, pack (rows that neighbours are asked for), strain (continuity, velocity gradient, stress), force
-(momentum), move. Materials that carry tension use corrected gradients for strain and stress (see corrected.py), others
-the symmetric form of Monaghan (2005, Rep. Prog. Phys. 68:1703). Sums over pairs are those of pairs.py.
+(momentum), move; between ticks settling (settling.py). Materials that carry tension use corrected gradients for strain
+and stress (see corrected.py), others the symmetric form of Monaghan (2005, Rep. Prog. Phys. 68:1703). Sums over pairs
+are those of pairs.py.
 """
 
 import functools
@@ -20,22 +21,29 @@ from ..aging import rest_density
 from ..images import WALL_INSET, contained
 from ..tool import keep_out
 from .force_warp import force_pass
+from .settling_warp import settle_pass, tell_pass
 from .strain_warp import strain_pass
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 
 @functools.cache
-def passes(strength: bool, tensile: bool, viscous: bool, changing: bool, tooled: bool, cpu: bool) -> SimpleNamespace:
+def passes(
+    strength: bool, tensile: bool, viscous: bool, changing: bool, settling: bool, tooled: bool, cpu: bool
+) -> SimpleNamespace:
     """The passes for materials with or without shear stiffness, tension, viscosity, parameters or rest densities that
-    differ between particles, and a rigid body that is carried along: unused physics costs nothing."""
+    differ between particles, anything that settles, and a rigid body that is carried along: unused physics costs
+    nothing."""
     name = "strength" if strength else "tensile" if tensile else "liquid"
     name += "_viscous" if viscous else "_inviscid"
     name += "_changing" * changing + "_tooled" * tooled
     strain = strain_pass(strength, tensile, changing, tooled).compiled(f"strain_{name}", cpu)
     force = force_pass(strength, tensile, viscous, changing, tooled).compiled(f"force_{name}", cpu)
-    kept_out = {"keep_out": keep_out} if tooled else {}
-    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **kept_out)
+    more = {"keep_out": keep_out} if tooled else {}
+    if settling:
+        more["tell"] = tell_pass(tooled).compiled("tell" + "_tooled" * tooled, cpu)
+        more["settle"] = settle_pass().compiled("settle", cpu)
+    return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **more)
 
 
 @wp.kernel

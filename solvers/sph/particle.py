@@ -17,8 +17,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 slope = warp_func(wendland_slope)
 
-WHOLE = wp.constant(0.15)  # a flat free surface leans by 0.6, the layer below it by 0.04 to 0.1 (h / d = 1.3 to 1.5)
-
 
 @wp.struct
 class Smoothing:
@@ -34,8 +32,10 @@ class Smoothing:
     artificial_viscosity: float  # alpha [-]
     hourglass: float  # zeta [-]
     shifting: float  # shift over strain and h^2 crowding [-]
-    density_tolerance: float  # gap between the two that is left alone, over the density [-]
-    density_feedback: float  # rate at which the integrated density follows the summed one, in c / h [-]
+    density_feedback: float  # rate at which integrated density follows a crowd's, in c / h [-]
+    density_tolerance: float  # gap between the two that is left alone where they settle, over `disorder` [-]
+    settling: float  # `shifting` times the time from tick to tick [s]
+    disorder: float  # by how much particles in no order lean, see settling.py [-]
 
 
 @wp.func
@@ -64,22 +64,7 @@ def broken(crowd: wp.vec3, limit: float):
 
 
 @wp.func
-def drifted(num: Smoothing, phase: Phase, rho: float, rest: float, grown: bool, second: float, first_moment: wp.vec3):
-    """By how much the density that particles really have exceeds the one that they integrate, rho [kg/m^3].
-
-    Taken from the second moment where the neighbourhood is complete (it leans to no side), or too crowded for any; what
-    lies within the tolerance is left alone.
-    """
-    drift = second * num.lattice / 3.0 - rho
-    whole = wp.max(1.0 - wp.length(first_moment) * num.h / (WHOLE * rho), 0.0)
-    if drift > 0.0:
-        whole = 1.0
-    tolerance = float(num.density_tolerance)
-    if grown:
-        tolerance = wp.max(tolerance, DISORDER)
-    drift = wp.sign(drift) * wp.max(wp.abs(drift) - tolerance * rho, 0.0)
-    if phase.relaxation_rate > 0.0 or grown:
-        # in a stretched thread, and among the halves of split particles, a pair too close reads as thin, and would be
-        # pulled closer
-        drift = wp.max(drift, wp.min(rest - rho, 0.0))
-    return whole * drift
+def crowded(num: Smoothing, rho: float, second: float):
+    """By how much the density that particles really have, by the second moment, exceeds the one that they integrate,
+    rho [kg/m^3]; what disorder may feign is left alone. Lesser gaps are settled, see settling.py."""
+    return wp.max(second * num.lattice / 3.0 - (1.0 + DISORDER) * rho, 0.0)

@@ -36,6 +36,8 @@ from .bounds import bounds_of
 from .config import ConfigSPH
 from .force_warp import Forcing, width_of
 from .particle import Smoothing
+from .settling import TOLD, disorder
+from .settling_warp import Settling
 from .strain_warp import MATTER, Straining
 
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
@@ -63,7 +65,7 @@ class SolverSPH(Solver):
     lacking: ClassVar = LACKING
     Config: ClassVar = ConfigSPH
     passes = ("lists", "pack", "strain", "force", "drag", "move")
-    OWN: ClassVar = ("matter", "new_density", "state", "shift", "acceleration")
+    OWN: ClassVar = ("matter", "new_density", "state", "shift", "acceleration", "told")
     faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
 
     typical_rate, typical_bytes = 5.0e5, 1400.0
@@ -129,6 +131,8 @@ class SolverSPH(Solver):
         self.backend = backend_of(backend, scene, threads)
         self.implicit = scene.viscous and config.viscosity == "implicit"
         self.width = width_of(scene.elastic, scene.tensile, scene.changes)
+        self.settles = scene.flows and config.shifting > 0.0
+        self.arranges = int(self.settles)
         self.kernels = self.kernels_of(backend)
         self.num = Smoothing()
         ratio = config.smoothing(scene.scenario.material)
@@ -141,9 +145,11 @@ class SolverSPH(Solver):
         self.num.compact = (scene.spacing / opposing(ratio)) ** 2
         self.num.hourglass, self.num.shifting = config.hourglass, config.shifting
         self.num.density_feedback = config.density_feedback
-        self.num.density_tolerance = config.density_tolerance
+        self.num.density_tolerance, self.num.disorder = config.density_tolerance, disorder(ratio)
+        self.num.settling = config.shifting * scene.clock.tick
         pool.add_field("density", float, scene.scenario.material.density)
         pool.add_field("carried_gradient", wp.vec3)
+        pool.add_field("flowing", float)
         self._rest_densities()
         if scene.elastic:
             pool.add_field("elastic_normal", wp.vec3, wp.vec3(1.0, 1.0, 1.0), within=(1.0 / STRETCHED, STRETCHED))
@@ -157,6 +163,7 @@ class SolverSPH(Solver):
             self.new_density = wp.zeros(pool.size, dtype=float)
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
+            self.told = wp.zeros(pool.size * TOLD // 4 if self.settles else 1, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
         self.tool = (
             None if scene.outline is None else tool_of(scene, 2.0 * self.num.h, weights(self.num.h, self.implicit))
@@ -173,7 +180,8 @@ class SolverSPH(Solver):
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
         scene = self.scene
-        variant = scene.elastic, scene.tensile, scene.viscous and not self.implicit, scene.changes
+        viscous = scene.viscous and not self.implicit
+        variant = scene.elastic, scene.tensile, viscous, scene.changes, self.settles
         if backend == "taichi":
             from . import kernels_taichi
 
@@ -183,18 +191,21 @@ class SolverSPH(Solver):
     def _bring_together(self) -> None:
         """What the passes over pairs read and write, as they take it."""
         pool, scene = self.pool, self.scene
-        self.straining, self.forcing = Straining(), Forcing()
+        self.straining, self.forcing, self.settling = Straining(), Forcing(), Settling()
         for data in (self.straining, self.forcing):
-            data.dt, data.phases, data.phase_of = scene.dt, scene.phases, pool.phase
-            data.new_density = self.new_density
+            data.dt, data.new_density = scene.dt, self.new_density
+        for data in (self.straining, self.forcing, self.settling):
+            data.phases, data.phase_of = scene.phases, pool.phase
             if self.tool is not None:
                 data.tool = self.tool
         self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
-        self.straining.shift = self.shift
+        self.straining.shift, self.straining.flowing = self.shift, pool.flowing
         self.straining.growth = self.growth
         self.straining.plastic = plastic_strains(scene, pool)
         for name, array in zip(STRAINS, self._strains(), strict=True):
             setattr(self.straining, name, array)
+        self.settling.held, self.settling.mass, self.settling.density = pool.held, pool.mass, pool.density
+        self.settling.told, self.settling.flowing = self.told, pool.flowing
         self.forcing.forces, self.forcing.acceleration = scene.force, self.acceleration
 
     def _strains(self) -> list[wp.array]:
@@ -261,6 +272,12 @@ class SolverSPH(Solver):
 
     def strain(self) -> None:
         self._over_pairs(self.kernels.strain, self.matter, self.straining)
+
+    def arrange(self, turn: int) -> None:
+        self.lists()
+        self.pack()
+        self._over_pairs(self.kernels.tell, self.matter, self.settling)
+        self._over_pairs(self.kernels.settle, self.told, self.settling)
 
     def force(self) -> None:
         self._over_pairs(self.kernels.force, self.state, self.forcing)

@@ -26,7 +26,7 @@ from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
-from .particle import Smoothing, broken, drifted, pulled_back, slope, straggling
+from .particle import Smoothing, broken, crowded, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -53,6 +53,7 @@ class Straining:
     new_density: wp.array(dtype=float)
     state: wp.array(dtype=wp.vec4)  # rows of `force`
     shift: wp.array(dtype=wp.vec3)
+    flowing: wp.array(dtype=float)  # rate of shear of what flows, which settles [1/s]
     fault: wp.array(dtype=int)
     tool: Tool
 
@@ -211,14 +212,12 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         crowd /= rho
         if not flows:
             crowd = broken(crowd, num.broken)
+        data.flowing[i] = wp.where(flows and h > 0.0, strain / h, 0.0)
         data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * strain)
         if flows or grown:
-            drift = drifted(num, phase, rho, rest, grown, second, first_moment)
-            if not flows:
-                # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with
-                # no pressure to say so. What rests is told of such a crowd; of a lack it must not make tension.
-                drift = wp.max(drift, 0.0)
-            inflow += num.density_feedback * sound / num.h * drift
+            # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with no
+            # pressure to say so.
+            inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
         if flows:
             inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
         rho += h * inflow

@@ -28,6 +28,7 @@ ROWS = {
     "places": PLACE,
     "moving": [*PLACE, VELOCITY, (7, 8)],
     "pulling": [*PLACE, (4, 13), (13, 16)],
+    "told": [*PLACE, (4, 5), (5, 8)],
 }
 PUSHES = [*PLACE, (4, 7), (7, 8)]
 BY_WIDTH = {
@@ -183,6 +184,8 @@ class Twins:
         for name in self.warp.solver.passes:
             if name not in skipped:
                 yield name, lambda solver, name=name: getattr(solver, name)()
+        if self.method == "sph" and solver.arranges:
+            yield "arrange", lambda solver: solver.arrange(0)
 
     def differences(self, after: str) -> Iterator[str]:
         """One sentence for every array that is not the same after a pass."""
