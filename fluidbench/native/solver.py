@@ -66,7 +66,8 @@ class Solver(Method):
 
     def arrange(self, turn: int) -> None:
         """Enqueue, every `arranges` ticks before their substeps and recorded like them: particles into a better order,
-        which is no motion of matter. `turn` counts the calls, from 0 to `turns` - 1 and again."""
+        densities to what that order tells; which is no motion of matter. `turn` counts the calls, from 0 to `turns` - 1
+        and again."""
 
     def settle(self) -> None:
         """Enqueue, between substeps and recorded like them, when parents have had children, which lie over others. A

@@ -7,10 +7,12 @@ crowded. Every tick, where matter flows,
 
 A sum over V0 that is exact in a lattice, lattice / 3 sum_j V0_j r.grad W, tells by what share phi each place is filled,
 and h sum_j V0_j grad W how far it leans, l: to a free surface. Both are averaged over neighbours, by V0 W: a place
-alone is off by 2 or 3 % in disorder. Averaged so, a surface lacks `SURFACE` times the mean of |l|, at any depth.
+alone is off by 2 or 3 % in disorder. Averaged so, a surface lacks `SURFACE` times the mean of |l|, at any depth. The
+rate of shear is that of the tick's last substep, in a liquid's plain sums of all relative motion.
 
 Tried: a place's own phi and l. Noise in |l| was rectified: matter swelled by 3 to 10 % where a gap within the tolerance
-of either sign was taken off, and skins were drawn together by 2 to 5 % where only what leans little was heard.
+of either sign was taken off, and skins were drawn together by 2 to 5 % where only what leans little was heard. The mean
+of phi - rho / rho0: what flows among what does not made up for its neighbours' gaps, down to 0.63 rho0.
 """
 
 from math import sqrt
@@ -18,7 +20,7 @@ from math import sqrt
 DISORDERED = 0.083  # h = 1.8 d; 0.128 at 1.5, 0.174 at 1.3
 SURFACE = 0.56  # a flat surface 0.53 to 0.565, sheets of 3 h and more the same, cylinders of 3.3 and 2.2 h 0.56 to 0.63
 AVERAGED = 0.37  # of what disorder makes places lean by, what is left in the mean over neighbours
-TOLD = 8  # floats: position, V0; phi - rho / rho0, l
+TOLD = 8  # floats: position, V0; phi, l
 
 
 def disorder(ratio: float) -> float:
@@ -28,13 +30,14 @@ def disorder(ratio: float) -> float:
 
 
 def leaning(square: float, noise: float):
-    """|l| without what disorder makes of it, from its square."""
-    return sqrt(max(square - noise * noise, 0.0))
+    """|l| from its square, without what noise of that root mean square adds: of noise alone it is nothing, on average
+    (its length has Maxwell's distribution), and up to 0.31 `noise` less than nothing."""
+    return sqrt(max(square - noise * noise, 0.0)) - 0.31 * noise
 
 
 def drift(gap: float, lean: float, bent: float, tolerance: float):
-    """By how much density is too low [rho0]; `gap` is the mean of phi - rho / rho0, `lean` the length of the mean of l,
-    `bent` the mean of its length: more than `lean` where surfaces bend or are on either side. Both without noise.
+    """By how much density is too low [rho0]; `gap` is the mean of phi, less rho / rho0, `lean` the length of the mean
+    of l, `bent` the mean of its length: more than `lean` where surfaces bend or are on either side. Both without noise.
 
     Within the tolerance, and between what the least and the most of a surface would lack, nothing is known.
     """

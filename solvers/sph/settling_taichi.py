@@ -6,7 +6,7 @@ from ..aging import GROWN
 from ..neighbours_taichi import BoxT, ListsT, image_gradient
 from ..pairs_taichi import over_pairs, reader, vector_at, vector_into
 from ..smoothing import wendland
-from ..taichi_bridge import Floats, Ints, Phases, Quads, phase_at, taichi_func, ti, vec3, vec4
+from ..taichi_bridge import Floats, Ints, Phases, Quads, is_solid, phase_at, taichi_func, ti, vec3, vec4
 from . import settling
 from .particle_taichi import SmoothingT, slope
 from .strain_warp import MATTER
@@ -68,9 +68,9 @@ def tell(
         if i % capacity < count[i // capacity]:
             own = matter_at(matter, i)
             sums = told_of(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
-            gap, lean = sums[0] * num.lattice / 3.0 - own[7] / own[11], num.h * vector_at(sums, 1)
+            filled, lean = sums[0] * num.lattice / 3.0, num.h * vector_at(sums, 1)
             told[2 * i] = vec4(own[0], own[1], own[2], own[3] / own[11])
-            told[2 * i + 1] = vec4(gap, lean[0], lean[1], lean[2])
+            told[2 * i + 1] = vec4(filled, lean[0], lean[1], lean[2])
 
 
 @ti.kernel
@@ -97,14 +97,14 @@ def settle(
         if i - world * capacity < count[world]:
             own, phase = told_at(rows, i), phase_at(phases, world, phase_of[i])
             rest = mass[i] / own[3]
-            if held[i] == FREE and rest >= GROWN * phase.density:
+            if held[i] == FREE and rest >= GROWN * phase.density and not is_solid(phase):
                 sums = settled_by(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
                 sums += told_by(num, own[3] * weight(0.0, num.h), own)
-                gap, rho = sums[1] / sums[0], density[i]
+                filled, rho = sums[1] / sums[0], density[i]
                 mean = vec3(sums[2], sums[3], sums[4]) / sums[0]
                 lean = leaning(mean.norm_sqr(), AVERAGED * num.disorder)
-                off = drift(gap, lean, sums[5] / sums[0], num.density_tolerance * num.disorder)
+                off = drift(filled - rho / rest, lean, sums[5] / sums[0], num.density_tolerance * num.disorder)
                 if phase.relaxation_rate > 0.0:
                     off = ti.max(off, ti.min(1.0 - rho / rest, 0.0))
-                rate = heard(gap + rho / rest) * ti.min(num.settling * flowing[i], 1.0)
+                rate = heard(filled) * ti.min(num.settling * flowing[i], 1.0)
                 density[i] = rho + rest * rate * off

@@ -3,7 +3,7 @@
 import warp as wp
 
 from fluidbench.method.frame import FREE
-from fluidbench.native.scene import Box, Phase
+from fluidbench.native.scene import Box, Phase, is_solid
 from fluidbench.native.vector_access import store_vec4
 
 from ..aging import GROWN
@@ -34,7 +34,7 @@ class Settling:
     held: wp.array(dtype=int)
     mass: wp.array(dtype=float)
     flowing: wp.array(dtype=float)
-    told: wp.array(dtype=wp.vec4)  # rows of `settle`
+    told: wp.array(dtype=wp.vec4)  # rows of `settle`: see TOLD
     density: wp.array(dtype=float)
     tool: Tool
 
@@ -62,9 +62,9 @@ def tell_pass(tooled: bool) -> Pass:
                 second -= wp.trace(found.second)
                 lean += found.first
         lean *= num.h
-        gap = second * num.lattice / 3.0 - own[7] / own[11]
+        filled = second * num.lattice / 3.0
         store_vec4(data.told, 2 * i, wp.vec4(own[0], own[1], own[2], own[3] / own[11]))
-        store_vec4(data.told, 2 * i + 1, wp.vec4(gap, lean[0], lean[1], lean[2]))
+        store_vec4(data.told, 2 * i + 1, wp.vec4(filled, lean[0], lean[1], lean[2]))
 
     return Pass(Smoothing, Settling, MATTER, 4, pair, finish)
 
@@ -79,7 +79,7 @@ def seen_told(box: Box, data: Settling, row: floats(TOLD), j: int, code: int):
 
 
 def settle_pass() -> Pass:
-    """The means, and what follows from them. Sums: V0 W, and of that times the gap, l (3), |l|."""
+    """The means, and what follows from them. Sums: V0 W, and that times phi, l (3) and |l|."""
     Own, Other, Sums = floats(TOLD + 4), floats(TOLD), floats(6)
 
     @wp.func
@@ -100,20 +100,19 @@ def settle_pass() -> Pass:
         phase = data.phases[world, data.phase_of[i]]
         rest = data.mass[i] / own[3]
         # halves of split particles lie in no order: what has grown is told of crowds alone (see particle.py)
-        if data.held[i] == FREE and rest >= GROWN * phase.density:
+        if data.held[i] == FREE and rest >= GROWN * phase.density and not is_solid(phase):
             mine = Other()
             for c in range(TOLD):
                 mine[c] = own[c]
             sums += told_by(num, own[3] * weight(0.0, num.h), mine)
-            gap = sums[1] / sums[0]
+            filled = sums[1] / sums[0]
             mean = wp.vec3(sums[2], sums[3], sums[4]) / sums[0]
             lean = leaning(wp.dot(mean, mean), AVERAGED * num.disorder)
-            off = drift(gap, lean, sums[5] / sums[0], num.density_tolerance * num.disorder)
             rho = data.density[i]
+            off = drift(filled - rho / rest, lean, sums[5] / sums[0], num.density_tolerance * num.disorder)
             if phase.relaxation_rate > 0.0:
                 # in a stretched thread a pair too close reads as thin, and would be pulled closer
                 off = wp.max(off, wp.min(1.0 - rho / rest, 0.0))
-            filled = gap + rho / rest
             data.density[i] = rho + rest * heard(filled) * wp.min(num.settling * data.flowing[i], 1.0) * off
 
     return Pass(Smoothing, Settling, TOLD, 6, pair, finish, seen=seen_told)

@@ -92,7 +92,7 @@ class SolverSPH(Solver):
         return [
             Economy("fewer neighbours", {key: round(max(0.8 * getattr(config, key), 1.2), 3)}),
             Economy("larger dt", {"cfl": 2.0 * config.cfl, "viscous_number": 0.11}),
-            Economy("no density feedback", {"density_feedback": 0.0}),
+            Economy("no shifting", {"shifting": 0.0}),
         ]
 
     @classmethod
@@ -191,10 +191,10 @@ class SolverSPH(Solver):
     def _bring_together(self) -> None:
         """What the passes over pairs read and write, as they take it."""
         pool, scene = self.pool, self.scene
-        self.straining, self.forcing, self.settling = Straining(), Forcing(), Settling()
+        self.straining, self.forcing, self.telling = Straining(), Forcing(), Settling()
         for data in (self.straining, self.forcing):
             data.dt, data.new_density = scene.dt, self.new_density
-        for data in (self.straining, self.forcing, self.settling):
+        for data in (self.straining, self.forcing, self.telling):
             data.phases, data.phase_of = scene.phases, pool.phase
             if self.tool is not None:
                 data.tool = self.tool
@@ -204,8 +204,8 @@ class SolverSPH(Solver):
         self.straining.plastic = plastic_strains(scene, pool)
         for name, array in zip(STRAINS, self._strains(), strict=True):
             setattr(self.straining, name, array)
-        self.settling.held, self.settling.mass, self.settling.density = pool.held, pool.mass, pool.density
-        self.settling.told, self.settling.flowing = self.told, pool.flowing
+        self.telling.held, self.telling.mass, self.telling.density = pool.held, pool.mass, pool.density
+        self.telling.told, self.telling.flowing = self.told, pool.flowing
         self.forcing.forces, self.forcing.acceleration = scene.force, self.acceleration
 
     def _strains(self) -> list[wp.array]:
@@ -276,8 +276,8 @@ class SolverSPH(Solver):
     def arrange(self, turn: int) -> None:
         self.lists()
         self.pack()
-        self._over_pairs(self.kernels.tell, self.matter, self.settling)
-        self._over_pairs(self.kernels.settle, self.told, self.settling)
+        self._over_pairs(self.kernels.tell, self.matter, self.telling)
+        self._over_pairs(self.kernels.settle, self.told, self.telling)
 
     def force(self) -> None:
         self._over_pairs(self.kernels.force, self.state, self.forcing)

@@ -163,7 +163,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         spread = sums[0]
         first_moment = wp.vec3(sums[1], sums[2], sums[3])
         crowd = wp.vec3(sums[4], sums[5], sums[6])
-        second, inflow, strain, least, alone = float(0.0), float(0.0), float(0.0), float(0.0), float(0.0)
+        second, inflow, sheared, least, alone = float(0.0), float(0.0), float(0.0), float(0.0), float(0.0)
         flows = bool(True)
         gradient, deformation, correction, span = wp.mat33(), wp.mat33(), wp.mat33(), wp.mat33()
         if wp.static(tensile):
@@ -181,12 +181,12 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             deformation = strain_by_chords(span, gradient, h)
             gradient = span * gradient
             inflow = -rho * wp.trace(deformation)
-            strain = h * shear_rate(gradient)
+            sheared = shear_rate(gradient)
             least = least_eigenvalue(moment / rho)
         else:
             second = sums[7]
             inflow = sums[8]
-            strain = h * wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
+            sheared = wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
         if wp.static(strength):
             b = data.elastic_normal[i]
             s = data.elastic_shear[i]
@@ -212,8 +212,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         crowd /= rho
         if not flows:
             crowd = broken(crowd, num.broken)
-        data.flowing[i] = wp.where(flows and h > 0.0, strain / h, 0.0)
-        data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * strain)
+        data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, sheared, 0.0)
+        data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * h * sheared)
         if flows or grown:
             # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with no
             # pressure to say so.

@@ -6,7 +6,6 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fluidbench.native.simulation import Simulation
-from solvers.sph.settling import disorder
 
 from ..conftest import scenario
 
@@ -36,13 +35,30 @@ def apart(place):
     return place % EDGE
 
 
-def settled(shape="no surface", *, start=1.0, lacking=0.0, moved=0.0, strain=4.0, material=LIQUID, stick=False):
-    """Densities over that at rest, and how deep below faces of the box particles lie, after what lies in order in a
-    periodic box is sheared by `strain` without moving; `lacking` and `moved` as in test_settling.py."""
+def settled(
+    shape="no surface",
+    *,
+    start=1.0,
+    lacking=0.0,
+    moved=0.0,
+    renewed=0,
+    flowing=1.0,
+    strain=4.0,
+    material=LIQUID,
+    floor=0.0,
+):
+    """Densities over that at rest of what flows, and the solver, after what lies in order in a periodic box is sheared
+    by `strain` without moving.
+
+    `lacking` is the share of particles that are not there; `moved` [d] how far all lie off their places, anew every so
+    many calls if `renewed`; `flowing` the share of particles that do. The box has a floor this much higher, if at all.
+    """
     faces = {f"{axis}_{side}": "periodic" for axis in "xyz" for side in ("lower", "upper")}
     s = scenario(
-        domain={"lower": [0.0] * 3, "upper": [EDGE] * 3, "walls": faces | (FLOOR if stick else {})},
-        bodies=[{"kind": "box", "center": [EDGE / 2] * 3, "size": [EDGE] * 3}],
+        domain={"lower": [0.0, 0.0, floor], "upper": [EDGE] * 3, "walls": faces | (FLOOR if floor else {})},
+        bodies=[
+            {"kind": "box", "center": [EDGE / 2, EDGE / 2, (EDGE + floor) / 2], "size": [EDGE, EDGE, EDGE - floor]}
+        ],
         gravity=[0, 0, 0],
         spacing=D,
         material=material,
@@ -51,19 +67,22 @@ def settled(shape="no surface", *, start=1.0, lacking=0.0, moved=0.0, strain=4.0
     sim.prepare()
     sim.begin()
     pool, solver, n, rng = sim.pool, sim.solver, sim.pool.counts[0], np.random.default_rng(3)
-    place, mass = pool.position.numpy(), pool.mass.numpy()
-    kept = SHAPES[shape](*place[:n].T)
-    if moved:
-        place[:n] = apart(place[:n] + D * rng.normal(0.0, moved, (n, 3)))
-    mass[:n] *= np.where(kept, 1.0, 1e-6) * (rng.uniform(size=n) >= lacking)
-    for name, values in (("position", place), ("mass", mass), ("volume", mass / 1000.0)):
-        pool.fields[name].assign(np.maximum(values, 1e-20) if name != "position" else values)
+    place, mass, rates = pool.position.numpy(), pool.mass.numpy(), np.zeros(pool.size, np.float32)
+    ordered = place[:n].astype(float)
+    there = SHAPES[shape](*ordered.T) & (rng.uniform(size=n) >= lacking)
+    mass[:n] *= np.where(there, 1.0, 1e-9)
+    pool.mass.assign(mass)
+    pool.volume.assign(mass / 1000.0)
     pool.density.fill_(1000.0 * start)
-    pool.flowing.fill_(strain / CALLS / sim.tick)
-    solver.refresh()
-    for _ in range(CALLS if solver.arranges else 0):
+    rates[:n] = (rng.uniform(size=n) < flowing) * strain / CALLS / sim.tick
+    pool.flowing.assign(rates)
+    for call in range(CALLS if solver.arranges else 0):
+        if moved and (call == 0 or (renewed and call % renewed == 0)):
+            place[:n] = apart(ordered + D * rng.normal(0.0, moved, (n, 3)))
+            pool.position.assign(place)
+        solver.refresh()
         solver.arrange(0)
-    return pool.density.numpy()[:n][kept] / 1000.0, solver
+    return pool.density.numpy()[:n][there & (rates[:n] > 0.0)] / 1000.0, solver
 
 
 @pytest.mark.parametrize("material", [LIQUID, PASTE])
@@ -76,25 +95,35 @@ def test_a_free_surface_is_no_gap(shape, material):
     assert np.percentile(np.abs(found - 1.0), 90) < (0.006 if flat else 0.04)
 
 
-def test_a_floor_is_no_surface():
-    found, _ = settled("a flat one", stick=True)
-    assert found == pytest.approx(1.0, abs=0.01)
+@pytest.mark.parametrize("shape", ["a flat one", "a ridge"])
+def test_a_floor_is_no_surface(shape):
+    """Of layers of three and seven spacings. (Leaning unturned in its images, the first would be drawn by 0.08.)"""
+    found, _ = settled(shape, floor=0.07)
+    assert found.mean() == pytest.approx(1.0, abs=0.015)
 
 
+@pytest.mark.parametrize("renewed", [0, 4])
 @pytest.mark.parametrize("material", [LIQUID, PASTE])
-def test_disorder_is_no_gap_either(material):
-    """To the tolerance, which is 0.01 for a liquid (h = 1.8 d) and 0.021 for a paste (1.3 d)."""
-    found, solver = settled(moved=0.2, material=material)
+def test_disorder_is_no_gap_either(material, renewed):
+    """To the tolerance, which is 0.01 for a liquid (h = 1.8 d) and 0.021 for a paste (1.3 d), whatever the strain."""
+    found, solver = settled(moved=0.2, renewed=renewed, strain=20.0, material=material)
     tolerance = solver.config.density_tolerance * solver.num.disorder
-    assert found.mean() == pytest.approx(1.0, abs=tolerance) and found.std() < 2.0 * tolerance
+    assert found.mean() == pytest.approx(1.0, abs=tolerance) and found.std() < 1.2 * tolerance
+
+
+@pytest.mark.parametrize("start", [1.1, 0.9])
+def test_what_flows_among_what_does_not_makes_up_for_no_one(start):
+    found, solver = settled(start=start, flowing=0.1)
+    tolerance = solver.config.density_tolerance * solver.num.disorder
+    assert found == pytest.approx(1.0 + np.sign(start - 1.0) * tolerance, abs=0.6 * tolerance)
 
 
 @pytest.mark.parametrize("start", [1.1, 0.9])
 def test_density_becomes_what_there_is_but_for_the_tolerance(start):
-    """At four times the strain: after a strain of 0.05 by a fifth."""
+    """At four times the strain: after a strain of 0.05 by a fifth. More noise is taken off than a lattice has."""
     found, solver = settled(start=start)
-    tolerance = solver.config.density_tolerance * disorder(1.8)
-    assert found == pytest.approx(1.0 + np.sign(start - 1.0) * tolerance, abs=1e-3)
+    tolerance = solver.config.density_tolerance * solver.num.disorder
+    assert found == pytest.approx(1.0 + np.sign(start - 1.0) * tolerance, abs=0.6 * tolerance)
     begun, _ = settled(start=start, strain=0.05)
     share = (begun.mean() - start) / (found.mean() - start)
     assert share == pytest.approx(1.0 - np.exp(-4.0 * 0.05), rel=0.05)
@@ -108,9 +137,9 @@ def test_what_does_not_flow_keeps_its_density():
 
 
 def test_what_is_porous_is_told_so():
-    """By half, where every fifth is lacking at random: beside a hole places lean."""
+    """By three quarters, where every fifth is lacking at random: beside a hole places lean."""
     found, _ = settled(lacking=0.2)
-    assert 0.8 < found.mean() < 0.92
+    assert 0.8 < found.mean() < 0.87
 
 
 def test_a_spray_is_not_heard():
