@@ -42,7 +42,7 @@ class ConfigSPH(Config):
         description="rate, in c / h, at which integrated density follows the summed one where it is crowded",
     )
     density_tolerance: NonNegative = Field(
-        0.12, description="gap between the two that is left alone where they settle, over what disorder feigns"
+        0.06, description="gap between the two that is left alone where they settle, over what disorder feigns"
     )
     skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
 

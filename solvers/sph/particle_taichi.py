@@ -3,13 +3,25 @@
 from ..aging import DISORDER
 from ..smoothing import wendland_slope
 from ..taichi_bridge import struct_of, taichi_func, ti
-from .particle import Smoothing
+from .particle import CROWD, Smoothing
 
 slope = taichi_func(wendland_slope)
 SmoothingT = struct_of(Smoothing)
 
 
 @ti.func
-def crowded(num, rho, second):
+def crowded(num, rho, grown, second):
     """What is summed beyond what is integrated and disorder may feign: see particle.py."""
-    return ti.max(second * num.lattice / 3.0 - (1.0 + DISORDER) * rho, 0.0)
+    tolerance = CROWD * num.density_tolerance * num.disorder
+    if grown:
+        tolerance = DISORDER
+    return ti.max(second * num.lattice / 3.0 - (1.0 + tolerance) * rho, 0.0)
+
+
+@ti.func
+def damped(num, phase, rho, sheared):
+    """The rate at which what is sheared so settles: see particle.py."""
+    rate = sheared
+    if phase.shear_modulus <= 0.0:
+        rate = ti.min(sheared, phase.viscosity / (rho * num.h * num.h))
+    return rate

@@ -5,10 +5,11 @@ crowded. Every tick, where matter flows,
 
     rho += min(shifting |2 dev D| dt, 1) heard `drift` rho0
 
-A sum over V0 that is exact in a lattice, lattice / 3 sum_j V0_j r.grad W, tells by what share phi each place is filled,
-and h sum_j V0_j grad W how far it leans, l: to a free surface. Both are averaged over neighbours, by V0 W: a place
-alone is off by 2 or 3 % in disorder. Averaged so, a surface lacks `SURFACE` times the mean of |l|, at any depth. The
-rate of shear is that of the tick's last substep, in a liquid's plain sums of all relative motion.
+with the rate of shear of the tick's last substep (a liquid's in plain sums of all relative motion, and no more than
+nu / h^2: see particle.py). A sum over V0 that is exact in a lattice, lattice / 3 sum_j V0_j r.grad W, tells by what
+share phi each place is filled, and h sum_j V0_j grad W how far it leans, l: to a free surface. Both are averaged over
+neighbours, by V0 W: a place alone is off by 2 or 3 % in disorder. Averaged so, a surface lacks `SURFACE` to `MOST`
+times the mean of |l|, at any depth.
 
 Tried: a place's own phi and l. Noise in |l| was rectified: matter swelled by 3 to 10 % where a gap within the tolerance
 of either sign was taken off, and skins were drawn together by 2 to 5 % where only what leans little was heard. The mean
@@ -18,7 +19,8 @@ of phi - rho / rho0: what flows among what does not made up for its neighbours' 
 from math import sqrt
 
 DISORDERED = 0.083  # h = 1.8 d; 0.128 at 1.5, 0.174 at 1.3
-SURFACE = 0.56  # a flat surface 0.53 to 0.565, sheets of 3 h and more the same, cylinders of 3.3 and 2.2 h 0.56 to 0.63
+SURFACE = 0.56  # flat surfaces 0.53 to 0.565 at any depth, sheets of 3 h and more the same
+MOST = 0.62  # sheets of 2 h 0.60 to 0.64, cylinders of 3.3 and 2.2 h 0.56 to 0.63
 AVERAGED = 0.37  # of what disorder makes places lean by, what is left in the mean over neighbours
 TOLD = 8  # floats: position, V0; phi, l
 
@@ -41,10 +43,10 @@ def drift(gap: float, lean: float, bent: float, tolerance: float):
 
     Within the tolerance, and between what the least and the most of a surface would lack, nothing is known.
     """
-    return max(gap + SURFACE * lean - tolerance, 0.0) + min(gap + SURFACE * max(lean, bent) + tolerance, 0.0)
+    return max(gap + SURFACE * lean - tolerance, 0.0) + min(gap + MOST * max(lean, bent) + tolerance, 0.0)
 
 
 def heard(filled: float):
-    """How much of that counts, by the mean of phi, which is 0.7 on a flat surface: nothing where half is lacking, for
-    that is a spray."""
-    return min(max(5.0 * filled - 2.5, 0.0), 1.0)
+    """How much of that counts, by the mean of phi, which is 0.7 on a flat surface: nothing below 0.6. Sheets thinner
+    than 2 h and drops of a few particles lack more than they lean; drawn together, they would lose their volume."""
+    return min(max(10.0 * filled - 6.0, 0.0), 1.0)

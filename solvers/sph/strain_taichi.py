@@ -46,7 +46,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_warp import width_of
-from .particle_taichi import SmoothingT, crowded, slope
+from .particle_taichi import SmoothingT, crowded, damped, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
 kernel = taichi_func(wendland)
@@ -172,8 +172,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
                 if flows or grown:
-                    inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
-                flowing[i] = sheared if flows and held[i] != CARRIED else 0.0
+                    inflow += num.density_feedback * sound / num.h * crowded(num, rho, grown, second)
+                flowing[i] = damped(num, phase, rho, sheared) if flows and held[i] != CARRIED else 0.0
                 shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
                 rho += h * inflow
                 if rho <= -rest or beyond(rho, CRUSHED * rest):

@@ -26,7 +26,7 @@ from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
-from .particle import Smoothing, broken, crowded, pulled_back, slope, straggling
+from .particle import Smoothing, broken, crowded, damped, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -212,12 +212,12 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         crowd /= rho
         if not flows:
             crowd = broken(crowd, num.broken)
-        data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, sheared, 0.0)
+        data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, damped(num, phase, rho, sheared), 0.0)
         data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * h * sheared)
         if flows or grown:
             # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with no
             # pressure to say so.
-            inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
+            inflow += num.density_feedback * sound / num.h * crowded(num, rho, grown, second)
         if flows:
             inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
         rho += h * inflow

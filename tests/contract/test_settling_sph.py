@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fluidbench.native.simulation import Simulation
+from solvers.sph.settling import AVERAGED, SURFACE
 
 from ..conftest import scenario
 
@@ -18,6 +19,8 @@ SHAPES = {
     "a flat one": lambda x, y, z: z < 0.1,
     "a strand, twelve across": lambda x, y, z: np.hypot(x - 0.1, z - 0.1) < 0.06,
     "a sheet, six across": lambda x, y, z: np.abs(z - 0.1) < 0.03,
+    "a thin sheet": lambda x, y, z: np.abs(z - 0.1) < 0.02,
+    "a drop of four across": lambda x, y, z: np.maximum(np.maximum(abs(x - 0.1), abs(y - 0.1)), abs(z - 0.1)) < 0.02,
     "a ridge": lambda x, y, z: (x > 0.06) & (z < 0.14),
 }
 
@@ -86,13 +89,13 @@ def settled(
 
 
 @pytest.mark.parametrize("material", [LIQUID, PASTE])
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", [shape for shape in SHAPES if "thin" not in shape and "drop" not in shape])
 def test_a_free_surface_is_no_gap(shape, material):
-    """To 0.2 % where it is flat. (A gap of 0.55 |mean of l| alone would draw the strand by 2.6 %, the sheet by 4.)"""
+    """To 0.3 % where it is flat. (A gap of 0.55 |mean of l| alone would draw the strand by 2.6 %, the sheet by 4.)"""
     found, _ = settled(shape, material=material)
     flat = shape in ("no surface", "a flat one")
-    assert found.mean() == pytest.approx(1.0, abs=2e-3 if flat else 0.01)
-    assert np.percentile(np.abs(found - 1.0), 90) < (0.006 if flat else 0.04)
+    assert found.mean() == pytest.approx(1.0, abs=3e-3 if flat else 0.01)
+    assert np.percentile(np.abs(found - 1.0), 90) < (0.008 if flat else 0.04)
 
 
 @pytest.mark.parametrize("shape", ["a flat one", "a ridge"])
@@ -105,26 +108,22 @@ def test_a_floor_is_no_surface(shape):
 @pytest.mark.parametrize("renewed", [0, 4])
 @pytest.mark.parametrize("material", [LIQUID, PASTE])
 def test_disorder_is_no_gap_either(material, renewed):
-    """To the tolerance, which is 0.01 for a liquid (h = 1.8 d) and 0.021 for a paste (1.3 d), whatever the strain."""
-    found, solver = settled(moved=0.2, renewed=renewed, strain=20.0, material=material)
-    tolerance = solver.config.density_tolerance * solver.num.disorder
-    assert found.mean() == pytest.approx(1.0, abs=tolerance) and found.std() < 1.2 * tolerance
+    """Whatever the strain: the mean of a liquid (h = 1.8 d) to 0.2 %, of a paste (1.3 d) to 1."""
+    found, _ = settled(moved=0.2, renewed=renewed, strain=20.0, material=material)
+    assert found.mean() == pytest.approx(1.0, abs=0.002 if material is LIQUID else 0.012)
+    assert found.std() < (0.012 if material is LIQUID else 0.03)
 
 
+@pytest.mark.parametrize("flowing", [1.0, 0.1])
 @pytest.mark.parametrize("start", [1.1, 0.9])
-def test_what_flows_among_what_does_not_makes_up_for_no_one(start):
-    found, solver = settled(start=start, flowing=0.1)
+def test_density_becomes_what_there_is_but_for_the_tolerance(start, flowing):
+    """At four times the strain: after a strain of 0.05 by a fifth. More noise is taken off than a lattice has. What
+    flows among what does not makes up for no one."""
+    found, solver = settled(start=start, flowing=flowing)
     tolerance = solver.config.density_tolerance * solver.num.disorder
-    assert found == pytest.approx(1.0 + np.sign(start - 1.0) * tolerance, abs=0.6 * tolerance)
-
-
-@pytest.mark.parametrize("start", [1.1, 0.9])
-def test_density_becomes_what_there_is_but_for_the_tolerance(start):
-    """At four times the strain: after a strain of 0.05 by a fifth. More noise is taken off than a lattice has."""
-    found, solver = settled(start=start)
-    tolerance = solver.config.density_tolerance * solver.num.disorder
-    assert found == pytest.approx(1.0 + np.sign(start - 1.0) * tolerance, abs=0.6 * tolerance)
-    begun, _ = settled(start=start, strain=0.05)
+    noise = SURFACE * 0.31 * AVERAGED * solver.num.disorder
+    assert found == pytest.approx(1.0 - noise - tolerance if start < 1.0 else 1.0, abs=1e-3)
+    begun, _ = settled(start=start, flowing=flowing, strain=0.05)
     share = (begun.mean() - start) / (found.mean() - start)
     assert share == pytest.approx(1.0 - np.exp(-4.0 * 0.05), rel=0.05)
 
@@ -146,3 +145,10 @@ def test_a_spray_is_not_heard():
     """Where three quarters are lacking, nothing is drawn together."""
     found, _ = settled(lacking=0.75)
     assert found.mean() > 0.99
+
+
+@pytest.mark.parametrize("shape", ["a thin sheet", "a drop of four across"])
+def test_what_is_thin_is_not_drawn_together(shape):
+    """It lacks more than it leans: drawn together, it would lose its volume."""
+    found, _ = settled(shape)
+    assert found.mean() > 0.985
