@@ -17,7 +17,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 slope = warp_func(wendland_slope)
 
-CROWD = wp.constant(6.0)  # what a single place feigns, over what settling leaves alone
+CROWD = wp.constant(0.03)  # by which places in no order may seem denser than they are, over the density
 
 
 @wp.struct
@@ -69,7 +69,7 @@ def broken(crowd: wp.vec3, limit: float):
 def crowded(num: Smoothing, rho: float, grown: bool, second: float):
     """By how much the density that particles really have, by the second moment, exceeds the one that they integrate,
     rho [kg/m^3]; what disorder may feign is left alone. Lesser gaps are settled, see settling.py."""
-    tolerance = CROWD * num.density_tolerance * num.disorder
+    tolerance = float(CROWD)
     if grown:
         tolerance = DISORDER
     return wp.max(second * num.lattice / 3.0 - (1.0 + tolerance) * rho, 0.0)

@@ -12,7 +12,7 @@ SmoothingT = struct_of(Smoothing)
 @ti.func
 def crowded(num, rho, grown, second):
     """What is summed beyond what is integrated and disorder may feign: see particle.py."""
-    tolerance = CROWD * num.density_tolerance * num.disorder
+    tolerance = CROWD
     if grown:
         tolerance = DISORDER
     return ti.max(second * num.lattice / 3.0 - (1.0 + tolerance) * rho, 0.0)

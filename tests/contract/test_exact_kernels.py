@@ -8,7 +8,6 @@ from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from solvers.sph.particle import CROWD
-from solvers.sph.settling import disorder
 
 from ..conftest import drive, scenario
 
@@ -222,8 +221,7 @@ def test_the_density_of_sph_follows_that_of_a_crowd_at_its_rate(start):
     sim, dt = Simulation(s, "sph"), 1e-4
     sim.pool.density.fill_(1000.0 * start)
     sim.march(dt, 1)
-    feigned = CROWD * sim.config.density_tolerance * disorder(1.8)
-    crowd = max(1000.0 * (1.0 - (1.0 + feigned) * start), 0.0)
+    crowd = max(1000.0 * (1.0 - (1.0 + CROWD) * start), 0.0)
     expected = dt * sim.config.density_feedback * 4.0 / (1.8 * 0.01) * crowd
     change = sim.pool.density.numpy()[: sim.pool.counts[0]] - np.float32(1000.0 * start)
     assert change == pytest.approx(np.full(len(change), expected), rel=0.02, abs=2e-4)
