@@ -21,6 +21,7 @@ from math import sqrt
 DISORDERED = 0.083  # h = 1.8 d; 0.128 at 1.5, 0.174 at 1.3
 SURFACE = 0.56  # flat surfaces 0.53 to 0.565 at any depth, sheets of 3 h and more the same
 MOST = 0.62  # sheets of 2 h 0.60 to 0.64, cylinders of 3.3 and 2.2 h 0.56 to 0.63
+LENGTHENED = 0.31  # mean of sqrt(max(r^2 - 1, 0)), r a length with Maxwell's distribution and a mean square of 1
 AVERAGED = 0.37  # of what disorder makes places lean by, what is left in the mean over neighbours
 TOLD = 8  # floats: position, V0; phi, l
 
@@ -32,9 +33,9 @@ def disorder(ratio: float) -> float:
 
 
 def leaning(square: float, noise: float):
-    """|l| from its square, without what noise of that root mean square adds: of noise alone it is nothing, on average
-    (its length has Maxwell's distribution), and up to 0.31 `noise` less than nothing."""
-    return sqrt(max(square - noise * noise, 0.0)) - 0.31 * noise
+    """|l| from its square, without what noise of that root mean square adds: of noise alone nothing, on average, and up
+    to `LENGTHENED` times it less than nothing."""
+    return sqrt(max(square - noise * noise, 0.0)) - LENGTHENED * noise
 
 
 def drift(gap: float, lean: float, bent: float, tolerance: float):
