@@ -291,10 +291,11 @@ def passes(alone: bool) -> SimpleNamespace:
                     if piston.on == 1:
                         before = ti.max(row[0] - 1, 0)
                         away = place - exit[row[0]]
-                        square = (away[0] ** 2 + away[1] ** 2) / piston.bore**2
-                        if square < 1.0 and away[2] > -BELOW * grid.dx[2] and feeding[before] > 0.0:
+                        square = away[0] ** 2 + away[1] ** 2
+                        within = square < piston.reach**2 and away[2] > -BELOW * grid.dx[2]
+                        if within and feeding[before] > 0.0:
                             going = drift[before]
-                            part = FINE / WIDE**2 * square
+                            part = FINE * square / (WIDE * piston.bore) ** 2
                             low = ti.cast(part, ti.i32)
                             flow = speed[low] + (part - low) * (speed[low + 1] - speed[low])
                             down = going[2] - feeding[before] * flow

@@ -5,6 +5,8 @@ m (U - u) / dt, to which matter of stress sigma yields by U - u = sigma dt / (rh
 quarter to a half of the piston's speed so, between bursts. So the nodes within the bore, from the first row at the
 exit upwards, move with the piston: with the profile that its flow has developed, sideways with the bore, and no slower
 down, for what flows away faster is not held back. Only while it extrudes: what lifts does not pull at what it has laid.
+A node moves what lies within half a cell of it, so those nearer than that to the rim are left alone: what flows past
+the bore is not pressed down. In a bore of a body they are held, with its wall.
 
 The piston is firm, its nodes move at its speed and not faster either, where viscosity is solved for (which faster nodes
 would make another equation with every velocity; whatever pushes at them changes nothing), and in the bore of a body:
@@ -40,6 +42,7 @@ class Piston:
     still: int  # 1 where it is asked by how much its nodes yield to what pushes: not at all
     walled: int  # 1 where the bore is that of a body
     bore: float  # radius [m]
+    reach: float  # of the nodes that it drives from the axis [m]
     rise: float  # of its upper end, where matter is let go, over the lower [m]
     speed: wp.array(dtype=float)  # of nodes while it extrudes, at equal steps of the radius squared up to WIDE [m/s]
     row: wp.array(dtype=int)  # of the end of the tick that substeps are in
@@ -55,12 +58,20 @@ def piston_of(scene: Scene, dx: Sequence[float], firm: bool = False, still: bool
         setattr(piston, name, getattr(clock.hours, name))
     piston.firm, piston.still, piston.walled = int(firm), int(still), int(scene.outline is not None)
     piston.bore, piston.rise = clock.bore
+    piston.reach = reach(piston.bore, dx, walled=scene.outline is not None)
     speed = np.zeros(1)
     if clock.stream is not None:
         piston.on = 1
         speed = sharpened(clock.speed_at, piston.bore, 0.5 * (dx[0] ** 2 + dx[1] ** 2))
     piston.speed = wp.array(speed.astype(np.float32), device=scene.device)
     return piston
+
+
+def reach(bore: float, dx: Sequence[float], walled: bool) -> float:
+    """How far from the axis nodes are driven [m], in cells of `dx`: as far as half a cell from the rim of the bore, the
+    nodes next to its axis at least; all that matter in the bore of a body reaches."""
+    across = float(np.hypot(dx[0], dx[1]))
+    return bore + REACHED * across if walled else max(bore - 0.25 * (dx[0] + dx[1]), 0.5 * across)
 
 
 def sharpened(profile: Callable[[np.ndarray], np.ndarray], radius: float, square: float) -> np.ndarray:
@@ -92,10 +103,7 @@ def driven(piston: Piston, grid: Grid, x: wp.vec3, v: wp.vec3):
     feeding = piston.feeding[before]
     away = x - piston.exit[row]
     radius = wp.length(wp.vec2(away[0], away[1]))
-    within = piston.bore
-    if piston.walled == 1:
-        within += REACHED * wp.sqrt(grid.dx[0] * grid.dx[0] + grid.dx[1] * grid.dx[1])
-    if (feeding > 0.0 or piston.walled == 1) and away[2] > -BELOW * grid.dx[2] and radius < within:
+    if (feeding > 0.0 or piston.walled == 1) and away[2] > -BELOW * grid.dx[2] and radius < piston.reach:
         out = piston.drift[before]
         out[2] -= feeding * speed_of(piston, radius / piston.bore)
         if piston.firm == 0:

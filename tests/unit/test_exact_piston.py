@@ -11,7 +11,7 @@ from fluidbench.scenario.bore import Bore
 from fluidbench.scenario.library import define
 from fluidbench.scenario.material import Material
 from solvers.mpm.grid import Grid
-from solvers.mpm.piston import Piston, driven, sharpened
+from solvers.mpm.piston import Piston, driven, reach, sharpened
 from solvers.smoothing import quadratic_spline
 
 DOWN = -0.3  # of the nozzle at 0.2 m/s upwards, extruding half of the time at 1 m/s
@@ -31,12 +31,13 @@ def parabola(radius):
     return 2.0 * (1.0 - (radius / 0.1) ** 2)
 
 
-def answers(places, velocity, feeding=0.5, firm=0, still=0, walled=0, profile=plug):
+def answers(places, velocity, feeding=0.5, firm=0, still=0, walled=0, profile=plug, bore=0.1):
     """Of nodes that would move at `velocity`, about a nozzle of radius 0.1 at (1, 2, 3) that goes at (4, 5, 0.2)."""
     piston, grid = Piston(), Grid()
-    piston.on, piston.bore = 1, 0.1
+    piston.on, piston.bore = 1, bore
     piston.speed = wp.array(sharpened(profile, 0.1, 0.04**2).astype(np.float32))
     piston.firm, piston.still, piston.walled = firm, still, walled
+    piston.reach = reach(bore, (0.04, 0.04, 0.02), walled == 1)
     piston.row, piston.feeding = wp.array([2], dtype=int), wp.array([9.0, feeding, 9.0], dtype=float)
     nowhere = [9.0] * 3
     piston.exit = wp.array([nowhere, nowhere, [1, 2, 3]], dtype=wp.vec3)
@@ -47,13 +48,19 @@ def answers(places, velocity, feeding=0.5, firm=0, still=0, walled=0, profile=pl
     return found.numpy().astype(float)
 
 
-INSIDE = [[1, 2, 2.995], [1.099, 2, 3.5], [1.07, 2.07, 3.001]]
-OUTSIDE = [[1, 2, 2.993], [1.101, 2, 3.5], [1.08, 2.07, 3.001]]
+INSIDE = [[1, 2, 2.995], [1.079, 2, 3.5], [1.056, 2.056, 3.001]]
+OUTSIDE = [[1, 2, 2.993], [1.081, 2, 3.5], [1.057, 2.057, 3.001]]  # half a cell of 0.04 from a rim at 0.1
 
 
 def test_it_drives_the_bore_from_the_first_row_at_the_exit_upwards():
     assert answers(INSIDE, (7, 8, 9)) == pytest.approx(np.tile([4, 5, DOWN], (3, 1)))
     assert answers(OUTSIDE, (7, 8, 9)) == pytest.approx(np.tile([7, 8, 9], (3, 1)))
+
+
+def test_of_a_bore_of_less_than_two_cells_it_drives_the_node_next_to_the_axis():
+    next_to_it = [[1 + x, 2 + y, 3.01] for x in (-0.019, 0.019) for y in (-0.019, 0.019)]
+    assert answers(next_to_it, (7, 8, 9), bore=0.03) == pytest.approx(np.tile([4, 5, DOWN], (4, 1)))
+    assert answers([[1.03, 2, 3.01]], (7, 8, 9), bore=0.03) == pytest.approx(np.tile([7, 8, 9], (1, 1)))
 
 
 def test_what_flows_away_faster_is_not_held_back():
