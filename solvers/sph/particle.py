@@ -17,8 +17,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 slope = warp_func(wendland_slope)
 
-CROWD = wp.constant(0.03)  # by which places in no order may seem denser than they are, over the density
-
 
 @wp.struct
 class Smoothing:
@@ -66,13 +64,10 @@ def broken(crowd: wp.vec3, limit: float):
 
 
 @wp.func
-def crowded(num: Smoothing, rho: float, grown: bool, second: float):
+def crowded(num: Smoothing, rho: float, second: float):
     """By how much the density that particles really have, by the second moment, exceeds the one that they integrate,
     rho [kg/m^3]; what disorder may feign is left alone. Lesser gaps are settled, see settling.py."""
-    tolerance = float(CROWD)
-    if grown:
-        tolerance = DISORDER
-    return wp.max(second * num.lattice / 3.0 - (1.0 + tolerance) * rho, 0.0)
+    return wp.max(second * num.lattice / 3.0 - (1.0 + DISORDER) * rho, 0.0)
 
 
 @wp.func

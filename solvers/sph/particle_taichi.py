@@ -3,19 +3,16 @@
 from ..aging import DISORDER
 from ..smoothing import wendland_slope
 from ..taichi_bridge import struct_of, taichi_func, ti
-from .particle import CROWD, Smoothing
+from .particle import Smoothing
 
 slope = taichi_func(wendland_slope)
 SmoothingT = struct_of(Smoothing)
 
 
 @ti.func
-def crowded(num, rho, grown, second):
+def crowded(num, rho, second):
     """What is summed beyond what is integrated and disorder may feign: see particle.py."""
-    tolerance = CROWD
-    if grown:
-        tolerance = DISORDER
-    return ti.max(second * num.lattice / 3.0 - (1.0 + tolerance) * rho, 0.0)
+    return ti.max(second * num.lattice / 3.0 - (1.0 + DISORDER) * rho, 0.0)
 
 
 @ti.func

@@ -172,7 +172,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
                 if flows or grown:
-                    inflow += num.density_feedback * sound / num.h * crowded(num, rho, grown, second)
+                    inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
                 flowing[i] = damped(num, phase, rho, sheared) if flows and held[i] != CARRIED else 0.0
                 shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
                 rho += h * inflow

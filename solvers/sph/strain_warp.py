@@ -217,7 +217,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if flows or grown:
             # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with no
             # pressure to say so.
-            inflow += num.density_feedback * sound / num.h * crowded(num, rho, grown, second)
+            inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
         if flows:
             inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
         rho += h * inflow

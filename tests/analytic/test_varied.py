@@ -120,14 +120,17 @@ def test_a_column_of_sph_above_the_critical_stress_stands():
     assert order(found[-1], column)["least_distance"] > 0.9
 
 
-@pytest.mark.parametrize("duration", [0.4, 0.8])
+@pytest.mark.parametrize("duration", [0.4, 0.8, 1.6])
 def test_rows_of_sph_do_not_slide_past_each_other(duration):
+    """Judged as the case judges, by the last four frames: about 0.8 s, when the rows next to the wall break up, a single
+    one is off by 5 to 11 %, and by 6 to 7 % ever after."""
     channel = bingham_channel.scenarios(bingham_channel.HALF / 12)["channel"]
-    channel = channel.model_copy(update={"duration": duration, "output_interval": duration / 4})
-    last = frames(channel, "sph")[-1]
-    y, u = last["position"][:, 1].astype(float), last["velocity"][:, 0].astype(float)
+    channel = channel.model_copy(update={"duration": duration, "output_interval": 0.1})
+    found = frames(channel, "sph")
+    y = np.concatenate([frame["position"][:, 1] for frame in found[-4:]]).astype(float)
+    u = np.concatenate([frame["velocity"][:, 0] for frame in found[-4:]]).astype(float)
     assert relative_l2(u, bingham_channel.exact(y)) < 0.1
-    assert order(last, channel)["least_distance"] > 0.75
+    assert order(found[-1], channel)["least_distance"] > 0.75
 
 
 @pytest.mark.parametrize("method", ["sph", "pbd"])

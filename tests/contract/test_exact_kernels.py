@@ -7,7 +7,7 @@ from fluidbench.method.verdict import Verdict
 from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
-from solvers.sph.particle import CROWD
+from solvers.aging import DISORDER
 
 from ..conftest import drive, scenario
 
@@ -209,7 +209,7 @@ def test_pbd_leaves_what_is_not_crowded_alone(gap):
 
 @pytest.mark.parametrize("start", [1.2, 0.8, 0.98])
 def test_the_density_of_sph_follows_that_of_a_crowd_at_its_rate(start):
-    """d rho = dt f (c / h) (rho_lattice - 1.03 rho) where that is positive, in a full period at rest."""
+    """d rho = dt f (c / h) (rho_lattice - 1.1 rho) where that is positive, in a full period at rest."""
     edge = 0.12
     s = scenario(
         domain={"lower": [0, 0, 0], "upper": [edge] * 3, "walls": EVERY_AXIS},
@@ -221,7 +221,7 @@ def test_the_density_of_sph_follows_that_of_a_crowd_at_its_rate(start):
     sim, dt = Simulation(s, "sph"), 1e-4
     sim.pool.density.fill_(1000.0 * start)
     sim.march(dt, 1)
-    crowd = max(1000.0 * (1.0 - (1.0 + CROWD) * start), 0.0)
+    crowd = max(1000.0 * (1.0 - (1.0 + DISORDER) * start), 0.0)
     expected = dt * sim.config.density_feedback * 4.0 / (1.8 * 0.01) * crowd
     change = sim.pool.density.numpy()[: sim.pool.counts[0]] - np.float32(1000.0 * start)
     assert change == pytest.approx(np.full(len(change), expected), rel=0.02, abs=2e-4)
