@@ -122,8 +122,9 @@ def test_a_column_of_sph_above_the_critical_stress_stands():
 
 @pytest.mark.parametrize("duration", [0.4, 0.8, 1.6])
 def test_rows_of_sph_do_not_slide_past_each_other(duration):
-    """Judged as the case judges, by the last four frames: about 0.8 s, when the rows next to the wall break up, a single
-    one is off by 5 to 11 %, and by 6 to 7 % ever after."""
+    """Judged by the last four frames, as the case judges. About 0.8 s, when the rows next to the wall break up, a frame
+    alone is off by up to 11 %, and by 6 to 7 % ever after.
+    """
     channel = bingham_channel.scenarios(bingham_channel.HALF / 12)["channel"]
     channel = channel.model_copy(update={"duration": duration, "output_interval": 0.1})
     found = frames(channel, "sph")
