@@ -295,8 +295,8 @@ def passes(alone: bool) -> SimpleNamespace:
                         within = square < piston.reach**2 and away[2] > -BELOW * grid.dx[2]
                         if within and feeding[before] > 0.0:
                             going = drift[before]
-                            part = FINE * square / (WIDE * piston.bore) ** 2
-                            low = ti.cast(part, ti.i32)
+                            part = ti.min(FINE * square / (WIDE * piston.bore) ** 2, FINE)
+                            low = ti.min(ti.cast(part, ti.i32), FINE - 1)
                             flow = speed[low] + (part - low) * (speed[low + 1] - speed[low])
                             down = going[2] - feeding[before] * flow
                             if piston.firm == 0:

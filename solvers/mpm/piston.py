@@ -42,7 +42,7 @@ class Piston:
     still: int  # 1 where it is asked by how much its nodes yield to what pushes: not at all
     walled: int  # 1 where the bore is that of a body
     bore: float  # radius [m]
-    reach: float  # of the nodes that it drives from the axis [m]
+    reach: float  # distance from the axis within which it drives nodes [m]
     rise: float  # of its upper end, where matter is let go, over the lower [m]
     speed: wp.array(dtype=float)  # of nodes while it extrudes, at equal steps of the radius squared up to WIDE [m/s]
     row: wp.array(dtype=int)  # of the end of the tick that substeps are in
@@ -68,8 +68,8 @@ def piston_of(scene: Scene, dx: Sequence[float], firm: bool = False, still: bool
 
 
 def reach(bore: float, dx: Sequence[float], walled: bool) -> float:
-    """How far from the axis nodes are driven [m], in cells of `dx`: as far as half a cell from the rim of the bore, the
-    nodes next to its axis at least; all that matter in the bore of a body reaches."""
+    """Distance from the axis within which nodes are driven [m], in cells of `dx` [m]: up to half a cell from the rim of
+    the bore, but the nodes next to the axis at least; in a body's bore all that matter in it reaches."""
     across = float(np.hypot(dx[0], dx[1]))
     return bore + REACHED * across if walled else max(bore - 0.25 * (dx[0] + dx[1]), 0.5 * across)
 
