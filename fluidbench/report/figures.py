@@ -33,6 +33,7 @@ def draw(plot: Plot) -> bytes:
     if plot.log:
         axes.set(xscale="log", yscale="log")
     if plot.equal:
+        figure.set_layout_engine("compressed")  # the other leaves titles no room where a scale is fixed
         axes.set_aspect("equal")
         axes.set_ylim(bottom=0)
     if any(trace.style != "bar" for trace in plot.traces):

@@ -1,12 +1,15 @@
 """What pictures show: sizes in the sketch, colours of particles, clouds on the page, scale bars, films in real time."""
 
+import io
+
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from fluidbench.errors import UserError
-from fluidbench.report.figures import figure_of
+from fluidbench.report.figures import draw, figure_of
 from fluidbench.report.page import turning
-from fluidbench.report.plot import Cloud
+from fluidbench.report.plot import Cloud, Plot, Trace
 from fluidbench.report.render import ruler, shown_at
 from fluidbench.report.table import in_millimetres
 from fluidbench.scenario.library import load
@@ -38,6 +41,16 @@ def test_what_is_sketched_lies_within_the_picture(name, monkeypatch):
         for cloud in axes.collections:
             x, y = np.asarray(cloud.get_offsets()).reshape(-1, 2).T
             assert not len(x) or (left < x.min() and x.max() < right and low <= y.min() and y.max() < high)
+
+
+@pytest.mark.parametrize("height", [4.0, 8.6, 8.8, 12.0])
+def test_nothing_of_a_plot_to_scale_is_cut_off(height):
+    """A bead as wide and as high as the picture lost its title, others did not."""
+    section = Trace("mpm", [-8.0, 0.0, 8.0], [0.1, height, 0.1])
+    drawn = draw(Plot("section", "middle of the path", "y [mm]", "z [mm]", [section], equal=True))
+    picture = imread(io.BytesIO(drawn))
+    for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]):
+        assert np.all(edge == 1.0)
 
 
 def frame(speeds, births):
