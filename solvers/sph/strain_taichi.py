@@ -63,7 +63,7 @@ def matter_seen(box, extra: ti.template(), row, j, code):
 def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
     """The kernel, see strain_warp.py."""
     width = width_of(strength, tensile, changing)
-    last, many = width - 4, 25 if strength else 22 if tensile else 10
+    last, many = width - 4, 25 if strength else 22 if tensile else 17
     write_state = writer(width)
 
     @ti.func
@@ -80,14 +80,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
         sums = vector_into(sums, 4, ti.max(near - 1.0, 0.0) * w * r)
         if ti.static(strength):
             sums = vector_into(sums, 22, w * u)
+        sums = matrix_into(sums, 7, -w * u.outer_product(r))
         if ti.static(tensile):
-            sums = matrix_into(sums, 7, -w * u.outer_product(r))
             square = -w * r.outer_product(r)
             sums = vector_into(sums, 16, vec3(square[0, 0], square[1, 1], square[2, 2]))
             sums = vector_into(sums, 19, vec3(square[0, 1], square[0, 2], square[1, 2]))
         else:
-            ur, r2 = u.dot(r), r.norm_sqr()
-            sums[7], sums[8], sums[9] = -w * r2, w * ur, -w * ur * ur / (r2 + 0.01 * num.h * num.h)
+            sums[16] = -w * r.norm_sqr()
         return sums
 
     strained_by = over_pairs(MATTER, many, strain_pair, matter_seen)
@@ -130,23 +129,22 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 grown = rest < GROWN * phase.density
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vector_at(sums, 1)
-                second, approach, sheared, alone, least, flows, h = 0.0, 0.0, 0.0, 0.0, 0.0, True, dt[world]
-                gradient, deformation, correction, span = mat3(0.0), mat3(0.0), mat3(0.0), mat3(0.0)
+                second, alone, least, flows, h = sums[16], 0.0, 0.0, True, dt[world]
+                deformation, correction, span = mat3(0.0), mat3(0.0), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
+                gradient = stressed(sums, 7) / rho
+                approach = -rho * gradient.trace()
                 if ti.static(tensile):
                     moment = symmetric_at(sums, 16)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
-                    gradient = stressed(sums, 7) @ correction / rho
+                    gradient = gradient @ correction
                     span = spanned(moment / rho, correction)
                     deformation = strain_by_chords(span, gradient, h)
                     gradient = span @ gradient
                     approach = -rho * deformation.trace()
-                    sheared = shear_rate(gradient)
                     least = least_eigenvalue(moment / rho)
-                else:
-                    second, approach = sums[7], sums[8]
-                    sheared = ti.sqrt(5.0 * ti.max(sums[9], 0.0) / rho)
+                sheared = shear_rate(gradient)
                 if ti.static(strength):
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
                     off = (vector_at(sums, 22) - gradient @ first_moment) / rho

@@ -73,14 +73,17 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
     """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
-    `move`). Sums: diffusion, the first moment (3), crowding (3); then the second moment, the inflow and the rate of
-    shear squared over 5; of what carries tension instead of these the velocity gradient (9) and the second moment
-    (xx yy zz xy xz yz), of what has strength also the motion off the mean of the neighbours (3).
+    `move`). Sums: diffusion, the first moment (3), crowding (3), the velocity gradient (9), the second moment (its
+    trace; of what carries tension xx yy zz xy xz yz), of what has strength also the motion off the mean of the
+    neighbours (3).
+
+    What shears is told by the gradient alone, a liquid's uncorrected, which a free surface halves. All relative motion,
+    noise included, made noise feed on itself: rows on a slip wall were held up by shifting as fast as they fell.
 
     A plain sum takes it for expansion when a particle comes to the surface, out of a bore: tension pulled the skin of
     strands together by a fifth. A liquid that cavitates feels none, and needs no correction.
     """
-    sums_of = 25 if strength else 22 if tensile else 10
+    sums_of = 25 if strength else 22 if tensile else 17
     state_of = width_of(strength, tensile, changing) // 4
     Own, Other, Sums = floats(MATTER + 4), floats(MATTER), floats(sums_of)
 
@@ -105,19 +108,17 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         for a in range(3):
             sums[1 + a] = m[a]
             sums[4 + a] = crowd[a]
+        for a in range(3):
+            for b in range(3):
+                sums[7 + 3 * a + b] = -u[a] * m[b]
         if wp.static(tensile):
             for a in range(3):
-                for b in range(3):
-                    sums[7 + 3 * a + b] = -u[a] * m[b]
                 sums[16 + a] = -m[a] * r[a]
             sums[19] = -m[0] * r[1]
             sums[20] = -m[0] * r[2]
             sums[21] = -m[1] * r[2]
         else:
-            ur = wp.dot(u, r)
-            sums[7] = -w * r2
-            sums[8] = w * ur
-            sums[9] = -w * ur * ur / (r2 + 0.01 * num.h * num.h)
+            sums[16] = -w * r2
         if wp.static(strength):
             for a in range(3):
                 sums[22 + a] = w * u[a]
@@ -132,17 +133,17 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             u = rho * seen_by_tool(tool, found, wp.vec3(own[4], own[5], own[6]))
             for a in range(3):
                 sums[1 + a] += rho * found.first[a]
+            for a in range(3):
+                for b in range(3):
+                    sums[7 + 3 * a + b] -= u[a] * found.own[b]
             if wp.static(tensile):
                 for a in range(3):
-                    for b in range(3):
-                        sums[7 + 3 * a + b] -= u[a] * found.own[b]
                     sums[16 + a] -= rho * found.second[a, a]
                 sums[19] -= rho * found.second[0, 1]
                 sums[20] -= rho * found.second[0, 2]
                 sums[21] -= rho * found.second[1, 2]
             else:
-                sums[7] -= rho * wp.trace(found.second)
-                sums[8] += wp.dot(u, found.own)
+                sums[16] -= rho * wp.trace(found.second)
             if wp.static(strength):
                 for a in range(3):
                     sums[22 + a] += u[a] * found.zeroth
@@ -163,9 +164,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         spread = sums[0]
         first_moment = wp.vec3(sums[1], sums[2], sums[3])
         crowd = wp.vec3(sums[4], sums[5], sums[6])
-        second, inflow, sheared, least, alone = float(0.0), float(0.0), float(0.0), float(0.0), float(0.0)
+        second, least, alone = float(sums[16]), float(0.0), float(0.0)
         flows = bool(True)
-        gradient, deformation, correction, span = wp.mat33(), wp.mat33(), wp.mat33(), wp.mat33()
+        deformation, correction, span = wp.mat33(), wp.mat33(), wp.mat33()
+        gradient = wp.mat33(
+            sums[7], sums[8], sums[9], sums[10], sums[11], sums[12], sums[13], sums[14], sums[15]
+        ) / rho  # fmt: skip
+        inflow = -rho * wp.trace(gradient)
         if wp.static(tensile):
             # density from the corrected gradient, too: the same strain for pressure and for shear
             moment = wp.mat33(
@@ -173,20 +178,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             )  # fmt: skip
             second = wp.trace(moment)
             correction = symmetric_inverse(moment / rho)
-            gradient = wp.mat33(
-                sums[7], sums[8], sums[9], sums[10], sums[11], sums[12], sums[13], sums[14], sums[15]
-            )  # fmt: skip
-            gradient = gradient * correction / rho
+            gradient = gradient * correction
             span = spanned(moment / rho, correction)
             deformation = strain_by_chords(span, gradient, h)
             gradient = span * gradient
             inflow = -rho * wp.trace(deformation)
-            sheared = shear_rate(gradient)
             least = least_eigenvalue(moment / rho)
-        else:
-            second = sums[7]
-            inflow = sums[8]
-            sheared = wp.sqrt(5.0 * wp.max(sums[9], 0.0) / rho)
+        sheared = shear_rate(gradient)
         if wp.static(strength):
             b = data.elastic_normal[i]
             s = data.elastic_shear[i]

@@ -1,5 +1,7 @@
 """What the known answers hold fixed, varied: how long matter rests and flows, grid ratios, sound speeds, spacings."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,8 @@ from fluidbench.registry import get_method
 from fluidbench.runs.drive import Drive
 from fluidbench.scenario.library import define, load
 from fluidbench.scenario.numerics import configure
-from scenarios.analytic import bingham_channel, rising_layer
+from fluidbench.study.trials import shaken
+from scenarios.analytic import bingham_channel, hydrostatic_column, rising_layer
 from scenarios.analytic.slump_slip import HEIGHT
 from scenarios.analytic.slump_slip import column as slender
 
@@ -132,6 +135,16 @@ def test_rows_of_sph_do_not_slide_past_each_other(duration):
     u = np.concatenate([frame["velocity"][:, 0] for frame in found[-4:]]).astype(float)
     assert relative_l2(u, bingham_channel.exact(y)) < 0.1
     assert order(found[-1], channel)["least_distance"] > 0.75
+
+
+@pytest.mark.parametrize("method", ["mpm", "sph"])
+def test_shaken_water_rests(method):
+    """In no order, for twice the case's time: what keeps particles apart feeds no motion."""
+    water = shaken(hydrostatic_column.scenarios(0.01)["tank"], seed=1)
+    water = water.replace(duration=2.0 * water.duration)
+    found = hydrostatic_column.evaluate({"tank": SimpleNamespace(scenario=water, frames=frames(water, method))})
+    assert found.error < 0.03
+    assert found.numbers[0].measured < 0.1
 
 
 @pytest.mark.parametrize("method", ["sph", "pbd"])
