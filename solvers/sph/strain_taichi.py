@@ -163,9 +163,9 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 inflow, crowd = approach, vector_at(sums, 4) / rho
                 flows = flows and not is_solid(phase)
                 if flows:
-                    if ti.static(strength and changing):
+                    if ti.static(strength):
                         enclosed = ti.math.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
-                        crowd += grown * enclosed / rho * first_moment
+                        crowd += enclosed / rho * first_moment
                     inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)

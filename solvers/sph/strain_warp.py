@@ -204,8 +204,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
                 data.elastic_shear[i] = s
                 data.off_linear[i] = z
         flows = flows and not is_solid(phase)
-        if wp.static(strength and changing):
-            if grown and flows:
+        if wp.static(strength):
+            if flows:
                 crowd += enclosed(least) * first_moment
         crowd /= rho
         if not flows:

@@ -123,18 +123,17 @@ def test_a_column_of_sph_above_the_critical_stress_stands():
     assert order(found[-1], column)["least_distance"] > 0.9
 
 
-@pytest.mark.parametrize("duration", [0.4, 0.8, 1.6])
-def test_rows_of_sph_do_not_slide_past_each_other(duration):
-    """Judged by the last four frames, as the case judges. About 0.8 s, when the rows next to the wall break up, a frame
-    alone is off by up to 11 %, and by 6 to 7 % ever after.
+@pytest.mark.parametrize("seed", [0, 1])
+def test_rows_of_sph_do_not_slide_past_each_other(seed):
+    """Nor past their images in the wall, whether they begin in order or not, up to four times the case's time. (What is
+    left is slow: hourglass control takes the bend of the profile for motion that no gradient shows, and resists it.)
     """
-    channel = bingham_channel.scenarios(bingham_channel.HALF / 12)["channel"]
-    channel = channel.model_copy(update={"duration": duration, "output_interval": 0.1})
+    channel = shaken(bingham_channel.scenarios(bingham_channel.HALF / 12)["channel"], seed)
+    channel = channel.replace(duration=1.6, output_interval=0.2)
     found = frames(channel, "sph")
-    y = np.concatenate([frame["position"][:, 1] for frame in found[-4:]]).astype(float)
-    u = np.concatenate([frame["velocity"][:, 0] for frame in found[-4:]]).astype(float)
-    assert relative_l2(u, bingham_channel.exact(y)) < 0.1
-    assert order(found[-1], channel)["least_distance"] > 0.75
+    flows = [(frame["position"][:, 1].astype(float), frame["velocity"][:, 0]) for frame in found[2:]]
+    assert max(relative_l2(u, bingham_channel.exact(y)) for y, u in flows) < 0.09
+    assert order(found[-1], channel)["least_distance"] > 0.85
 
 
 @pytest.mark.parametrize("method", ["mpm", "sph"])
