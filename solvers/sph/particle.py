@@ -15,6 +15,10 @@ from ..smoothing import wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
+# By how much what flows and has not grown is evened out, over what has: by h^2 times shear. At four times that, columns
+# crept on by 0.7 % of their height in 3 s.
+EVENED = wp.constant(0.25)
+
 slope = warp_func(wendland_slope)
 
 

@@ -46,6 +46,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_warp import width_of
+from .particle import EVENED
 from .particle_taichi import SmoothingT, crowded, damped, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
@@ -165,7 +166,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 if flows:
                     if ti.static(strength):
                         enclosed = ti.math.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
-                        crowd += enclosed / rho * first_moment
+                        crowd += ti.select(grown, 1.0, EVENED) * enclosed / rho * first_moment
                     inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)

@@ -143,8 +143,8 @@ LIQUID = {"youngs_modulus": None, "poisson_ratio": None, "sound_speed": 10.0}
     + [(ELASTIC, gap, gap < 0.6) for gap in (0.8, 0.63, 0.5)],
 )
 def test_only_near_partners_crowd_each_other(material, gap, moves):
-    """Two that have come together in a lattice that shears at 1 1/s: what flows is left alone to 0.9 spacings, what
-    strains elastically to 0.6, and beyond it feels the excess."""
+    """Two that have come together in a lattice that shears at 1 1/s: what flows is left alone to 0.9 spacings (a paste
+    is evened out a little), what strains elastically to 0.6, and beyond it feels the excess."""
     config = {"shifting": 4.0, "smoothing_ratio_solid": 1.5, "smoothing_ratio": 1.5}
     simulation = block(config, **material)
     pool = simulation.pool
@@ -159,7 +159,7 @@ def test_only_near_partners_crowd_each_other(material, gap, moves):
     simulation.march(dt, 1)
     shift = simulation.solver.shift.numpy()[[first, second], 0].astype(float) / (4.0 * dt * 1.5**2)
     if not moves:
-        assert not shift.any()
+        assert np.abs(shift).max() <= (0.005 if material is PASTE else 0.0)
     else:
         assert shift[0] < 0.0 < shift[1]
     if gap == 0.5:  # what else is near adds little
