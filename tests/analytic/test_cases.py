@@ -26,6 +26,7 @@ CHEAP = [
     ("shear_wave_decay", "pbd"),
     ("rigid_rotation", "mpm"),
     ("poiseuille_startup", "sph"),
+    ("poiseuille_startup", "pbd"),
     ("rigid_rotation", "pbd"),
     ("emission_mass_rate", "sph"),
     ("bingham_channel", "mpm"),

@@ -1,4 +1,4 @@
-"""What the known answers hold fixed, varied: how long matter rests and flows, grid ratios, sound speeds, spacings."""
+"""What the known answers hold fixed, varied: how long it rests and flows, grid ratio, sound speed, spacing, order."""
 
 from types import SimpleNamespace
 
