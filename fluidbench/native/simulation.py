@@ -61,6 +61,7 @@ class Simulation(Session):
                 raise UserError(f"{solver_class.name} cannot run {scenario.name}: {reason}")
         self.pool = Pool(self.scene, capacity_of(self.scenario))
         self.placement = Placement(self.scenario, self.pool)
+        self.placed = sum(self.pool.counts) > 0  # bodies, whose particles may lie where others are, since the last tick
         self.emission = Emission(self.scene, self.pool) if self.scenario.nozzle is not None else None
         material = self.scenario.material
         growing = material.expansion is not None
@@ -146,7 +147,7 @@ class Simulation(Session):
 
     def _expect(self) -> bool:
         """What the host must know or do at the start of a tick; whether the nozzle holds anything to be moved."""
-        self.placement.advance(self.now)
+        self.placed |= self.placement.advance(self.now)
         return self.emission is not None and self.emission.expect()
 
     def _plan(self) -> Plan:
@@ -159,11 +160,11 @@ class Simulation(Session):
 
     def _run_tick(self, feeding: bool, steps: Plan) -> None:
         """The audit, what happens to the material, and the substeps: replayed, but the first time in a process and
-        where births need the host."""
-        on_cpu, births = self.scene.device.is_cpu, self._births_due()
+        where bodies or births need the host."""
+        on_cpu, anew = self.scene.device.is_cpu, self.placed or self._births_due()
         turn = self._turn()
         audited, self.unseen = self.unseen or on_cpu, False  # on a GPU what nobody has looked at since is ours
-        if not self._use_graphs or self.aged == 0 or births:
+        if not self._use_graphs or self.aged == 0 or anew:
             if audited:
                 self._audit()
             self._age(feeding)
@@ -210,33 +211,36 @@ class Simulation(Session):
 
     def _age(self, feeding: bool) -> None:
         """What happens to material whatever the method, at the start of a tick."""
+        born = False
         with CountedLaunches() as counted:
             if self.emission is not None and feeding:
                 self.emission.feed()
             if self.growing is not None:
                 self.growing.grow()
-                if self._births_due() and self.growing.give_birth(self.now):
-                    self._settle()
+                born = self._births_due() and self.growing.give_birth(self.now)
             if self.curing is not None:
                 self.curing.ripen()
             if self.scene.carriage is not None:
                 self.scene.carriage.follow()
         if self.scene.crew.leading:
             self.process_launches = max(self.process_launches, counted.count)
+        if self.placed or born:
+            self._settle()
 
     def _births_due(self) -> bool:
         return self.growing is not None and self.growing.due(self.done)
 
     def _settle(self) -> None:
-        """Let the solver make room for what was born."""
+        """Let the solver make room for bodies that were placed and for what was born."""
         if self.aged == 0:
             self.solver.refresh()  # the first time outside any graph
         if self._use_graphs:
-            self.scene.crew.run("settle", self.solver.settle)
+            self.scene.crew.run(f"settle {self.placed}", lambda: self.solver.settle(self.placed))
         else:
             self._wait()
-            self.solver.settle()
+            self.solver.settle(self.placed)
             self._wait()
+        self.placed = False
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
@@ -400,6 +404,7 @@ class Simulation(Session):
         self.done, self.speed = progress["done"], progress["speed"]
         self.pool.counts, self.pool.stale = list(progress["counts"]), progress["stale"]
         self.placement.go_on(progress["placement"])
+        self.placed = False
         self.posted = None if progress["posted"] is None else Letter(**progress["posted"])
         if self.emission is not None:
             self.emission.go_on(progress["emission"])

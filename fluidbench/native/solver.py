@@ -69,9 +69,10 @@ class Solver(Method):
         densities to what that order tells; which is no motion of matter. `turn` counts the calls, from 0 to `turns` - 1
         and again."""
 
-    def settle(self) -> None:
-        """Enqueue, between substeps and recorded like them, when parents have had children, which lie over others. A
-        method whose pressure is finite lets it push them apart."""
+    def settle(self, placed: bool) -> None:
+        """Enqueue, between substeps and recorded like them, when bodies were `placed`, whose particles may lie at
+        random or within others, or parents had children, which lie over others. A method whose pressure is finite lets
+        it push them apart."""
 
     def carried(self) -> dict[str, Any]:
         """Arrays beyond the pool's that later substeps depend on, by name: what a checkpoint must hold."""

@@ -71,5 +71,4 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     quick=WIDTH / 20,
-    causes={"pbd": "out of order it begins with motion of its own, which counts 3 % at nu t / L^2 = 0.02"},
 )

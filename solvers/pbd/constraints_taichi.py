@@ -8,7 +8,7 @@ from fluidbench.method.frame import FREE
 from ..neighbours_taichi import BoxT, ListsT, image_gradient
 from ..pairs_taichi import over_pairs, reader, symmetric_at, vector_at, vector_into, writer
 from ..taichi_bridge import Floats, Ints, Phases, Quads, Vectors, is_solid, phase_at, ti, vec3, vec4
-from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SCARCE, SLACK, SLACK_SOLID
+from .constraints_warp import CROWDED, DRAWN, NEAREST, PARTED, SCARCE, SLACK_SOLID
 from .numbers import PLACE, push_row
 from .surroundings_taichi import NumbersT, flat, gradient, own_density, sloping, summed
 
@@ -70,7 +70,7 @@ def multipliers_of(drawn: bool) -> Callable:
                 fill[i] = dense
                 slope = vector_at(sums, 1).norm() * num.spacing
                 metric = num.response * (sums[4] * num.spacing * num.spacing + slope * slope) + num.relaxation
-                excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else SLACK)
+                excess = dense - 1.0 - (SLACK_SOLID if is_solid(phase) else num.slack)
                 multiplier = -ti.math.clamp(excess, 0.0, CROWDED) / metric
                 row = vector_into(ti.Vector.zero(ti.f32, length), 4, motion[i])
                 for c in ti.static(range(4)):
@@ -83,7 +83,7 @@ def multipliers_of(drawn: bool) -> Callable:
                         wave = dt[world] / num.spacing
                         compliance = num.iterations * mass[i] / (own[3] * phase.bulk_modulus * wave * wave)
                         row[15] = enclosure[i] * within
-                        row[14] = row[15] * (1.0 - SLACK - dense)
+                        row[14] = row[15] * (1.0 - num.slack - dense)
                         answered = ti.math.clamp(lack[i], 0.0, phase.tension_limit / phase.bulk_modulus)
                         multiplier += DRAWN * row[15] * answered / (metric + compliance)
                         normal, shear = fabric_normal[i], fabric_shear[i]

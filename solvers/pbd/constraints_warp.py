@@ -20,7 +20,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 vec5 = floats(5)
 
-SLACK = wp.constant(2.0e-3)  # density that is left alone, over that at rest: lattices of round bodies are off by it
 CROWDED = wp.constant(0.25)  # excess of density that is pushed apart at once: limits moves, and momentum stays
 NEAREST = wp.constant(0.5)  # spacings that two keep apart: density alone lets them pair
 PARTED = wp.constant(0.5)  # share of what two are too near that a correction takes away
@@ -103,7 +102,7 @@ def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
             if not is_solid(phase):
                 dense /= 1.0 + data.bias[i]
         data.fill[i] = dense
-        limit = 1.0 + wp.where(is_solid(phase), SLACK_SOLID, SLACK)
+        limit = 1.0 + wp.where(is_solid(phase), SLACK_SOLID, num.slack)
         # Lengths are scaled by the spacing to make epsilon a number.
         slopes = (sums[4] + wp.dot(together, together)) * num.spacing * num.spacing
         metric = num.response * slopes + num.relaxation
@@ -122,7 +121,7 @@ def multiplier_pass(drawn: bool, tooled: bool) -> Pass:
                 shear = wp.vec3(data.fabric_shear[i])
             n, s = multiplier * normal, multiplier * shear
             store_vec4(data.pushes, first + 2, wp.vec4(n[0], n[1], n[2], s[0]))
-            store_vec4(data.pushes, first + 3, wp.vec4(s[1], s[2], inside * (1.0 - SLACK - dense), inside))
+            store_vec4(data.pushes, first + 3, wp.vec4(s[1], s[2], inside * (1.0 - num.slack - dense), inside))
         else:
             store_vec4(data.pushes, first + 2, wp.vec4(multiplier, 0.0, 0.0, 0.0))
 

@@ -22,6 +22,7 @@ class Numbers:
     flat_weight: float  # the same of the kernel with a flat top [-]
     slope_weight: float  # the same of the kernel whose slope particles are moved along [-]
     response: float  # of the density to a move along that slope, over that of its own kernel's [-]
+    slack: float  # density over that at rest that is left alone [-]
     relaxation: float  # constraint force mixing epsilon [-]
     over_relaxation: float  # share of the Jacobi correction that is applied [-]
     face: float  # density at the face of a lattice, over that at rest [-]
@@ -40,6 +41,9 @@ class Numbers:
 # fabric (6), lack of density, how far it is enclosed. Of velocities: position, volume | velocity, what the density is
 # over-read by. Of stress: position, volume | stress (9), the traction that pulls back (3).
 PLACE, PUSH, DRAWING, MOVING, PULLING = 4, 12, 16, 8, 16
+
+SLACK = 2.0e-3  # lattices of round bodies are off by it
+SETTLED = 0.95  # of it where matter settles: float32 makes noise of a hundredth of it, which would push
 
 # Of paste that was laid and rests: 0.98 +- 0.01 within, 0.90 +- 0.04 from half a spacing to one below the surface.
 EVENNESS, ANY = (0.95, 0.98), (-1.0, 0.0)
@@ -60,6 +64,7 @@ def numbers_of(config: ConfigPBD, spacing: float, material: Material) -> Numbers
     num.flat_weight = 1.0 / lattice_sum(poly6, ratio)
     num.slope_weight = 1.0 / lattice_sum(spiky, ratio)
     num.response = response(ratio)
+    num.slack = SLACK
     num.relaxation, num.over_relaxation = config.relaxation, config.over_relaxation
     num.face, (num.face_moment, within) = face_level(ratio), moments(ratio)
     num.halfway = 0.5 * (num.face_moment + within)

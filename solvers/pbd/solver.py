@@ -30,11 +30,11 @@ from .bounds import bounds_of
 from .config import ConfigPBD
 from .constraints_warp import Constraining
 from .elasticity import Elasticity
-from .numbers import MOVING, PLACE, PULLING, numbers_of, push_row
+from .numbers import MOVING, PLACE, PULLING, SETTLED, numbers_of, push_row
 from .surroundings import Surroundings
 
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
-SETTLING = 10  # iterations after births: 30 leave volumes as they are to 1 %
+SETTLING_PLACED, SETTLING_BORN = 30, 10  # iterations; 30 after births change no volume by 1 %
 
 
 def weights(support: float) -> Weights:
@@ -115,6 +115,8 @@ class SolverPBD(Solver):
         self.backend = backend_of(backend, scene, threads)
         self.kernels = self.kernels_of(backend)
         self.num = numbers_of(config, scene.spacing, scene.scenario.material)
+        self.settling = numbers_of(config, scene.spacing, scene.scenario.material)
+        self.settling.slack *= SETTLED
         self.wall_friction_acts = FRICTION in (*scene.box.lower_kind, *scene.box.upper_kind)
         with wp.ScopedDevice(scene.device):
             self.motion = wp.zeros(pool.size, dtype=wp.vec3)
@@ -176,7 +178,7 @@ class SolverPBD(Solver):
             self.swell()
         self.predict()
         self.lists()
-        self.constrain(self.config.iterations)
+        self.constrain(self.num, self.config.iterations)
         self.velocities()
         if self.viscosity is not None:
             self.drag()
@@ -192,23 +194,24 @@ class SolverPBD(Solver):
                 self.strain()
                 self.pull()
 
-    def constrain(self, iterations: int) -> None:
+    def constrain(self, num: Any, iterations: int) -> None:
         for _ in range(iterations):
-            self.multipliers()
+            self.multipliers(num)
             self.correct()
             self.apply()
 
-    def settle(self) -> None:
-        """What was born where others are is moved apart in no time: pushed in a substep it would be flung. All worlds
-        of a batch are pressed, those without offspring by what little their density is off."""
+    def settle(self, placed: bool) -> None:
+        """What was born or placed where others are is moved apart in no time: pushed in a substep it would be flung
+        (the pre-stabilisation of Macklin et al. 2014). All worlds of a batch are pressed, those without offspring by
+        what little their density is off."""
         scene = self.scene
         self.refresh()
         scene.crew.alone(lambda: wp.copy(self.spans, scene.dt))
         scene.crew.alone(lambda: scene.dt.fill_(INSTANT * scene.spacing))
-        for _ in range(SETTLING):
+        for _ in range(SETTLING_PLACED if placed else SETTLING_BORN):
             self.predict()
             self.lists()  # what moves far in one iteration has other neighbours in the next
-            self.constrain(1)
+            self.constrain(self.settling, 1)
         scene.crew.alone(lambda: wp.copy(scene.dt, self.spans))
         self.refresh()
 
@@ -257,13 +260,13 @@ class SolverPBD(Solver):
     def lists(self) -> None:
         self.neighbours.update()
 
-    def _over_pairs(self, kernel: Any, rows: wp.array, data: Any) -> None:
+    def _over_pairs(self, kernel: Any, rows: wp.array, data: Any, num: Any = None) -> None:
         lists = self.neighbours
-        common = [self.num, self.scene.box, lists.lists, *self._active()]
+        common = [num or self.num, self.scene.box, lists.lists, *self._active()]
         self.backend.launch(kernel, lists.work, [*common, rows, data])
 
-    def multipliers(self) -> None:
-        self._over_pairs(self.kernels.multipliers, self.places, self.constraining)
+    def multipliers(self, num: Any = None) -> None:
+        self._over_pairs(self.kernels.multipliers, self.places, self.constraining, num)
 
     def correct(self) -> None:
         self._over_pairs(self.kernels.correct, self.pushes, self.constraining)

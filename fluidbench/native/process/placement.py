@@ -28,11 +28,13 @@ class Placement:
         self.waiting = self.waiting[len(self.waiting) - progress[0] :]
         self.placed = progress[1]
 
-    def advance(self, now: float) -> None:
-        """Place the bodies that are due at `now` [s]."""
+    def advance(self, now: float) -> bool:
+        """Place the bodies that are due at `now` [s]; whether there were any."""
+        before = self.placed
         while self.waiting and self.waiting[0].start <= now * (1.0 + 1e-9):
             body = self.waiting.pop(0)
             laid = lay_out(body, self.scenario)
             held, n = CLAMPED if body.clamped else FREE, len(laid.volume)
             self.pool.place(*laid, held, np.arange(self.placed, self.placed + n), body.start)
             self.placed += n
+        return self.placed > before
