@@ -212,7 +212,8 @@ class Health:
         self._boxes = self._boxes[::-1]  # one letter is on its way while the other is read
         signs, sent = self._boxes[0]
         wp.copy(signs, self.signs)
-        return Letter(time, list(self.pool.counts), signs, wp.record_event(sent))
+        sending = self.scene.device.stream  # Warp's default is the first GPU's, and refuses another's event
+        return Letter(time, list(self.pool.counts), signs, sending.record_event(sent))
 
     def open(self, letter: "Letter") -> Vital:
         """What it says, once it is here."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from fluidbench.measure.ledger import ledger, lengths
 from fluidbench.method.target import Target
@@ -25,6 +26,15 @@ def test_cuda_agrees_with_the_cpu(name):
     assert rows[0]["mass_kg"] == rows[1]["mass_kg"]
     for key in ("top_m", "center_x_m", "center_z_m"):
         assert rows[0][key] == pytest.approx(rows[1][key], abs=s.spacing / 2)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("name", NATIVE)
+def test_any_gpu_will_do(name):
+    """What Warp does by default it does on the first one: no run on another came through."""
+    if wp.get_cuda_device_count() < 2:
+        pytest.skip("there is one GPU")
+    assert drive(Simulation(bead(duration=0.4), name, Target("cuda:1"))).verdict is Verdict.COMPLETED
 
 
 @pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)])
