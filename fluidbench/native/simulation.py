@@ -224,8 +224,9 @@ class Simulation(Session):
                 self.scene.carriage.follow()
         if self.scene.crew.leading:
             self.process_launches = max(self.process_launches, counted.count)
-        if self.placed or born:
+        if self.solver.settles and (self.placed or born):
             self._settle()
+        self.placed = False
 
     def _births_due(self) -> bool:
         return self.growing is not None and self.growing.due(self.done)
@@ -240,7 +241,6 @@ class Simulation(Session):
             self._wait()
             self.solver.settle(self.placed)
             self._wait()
-        self.placed = False
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""

@@ -48,7 +48,7 @@ class SolverPBD(Solver):
     name = "pbd"
     rank = 3
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
-    shares_threads = True
+    shares_threads = settles = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     lacking: ClassVar = LACKING

@@ -30,6 +30,7 @@ def block(device, walls, room, side=SIDE, material=PASTE, **more):
     )
     sim = Simulation(made, "pbd", Target(device), graphs=False)
     sim.prepare()
+    sim.placed = False  # read as it was shaken, before it settles
     sim.begin()
     sim.scene.set_dt(1e-9)
     sim.solver.predict()
