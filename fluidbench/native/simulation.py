@@ -224,22 +224,22 @@ class Simulation(Session):
                 self.scene.carriage.follow()
         if self.scene.crew.leading:
             self.process_launches = max(self.process_launches, counted.count)
-        if self.solver.settles and (self.placed or born):
-            self._settle()
+        if self.solver.makes_room and (self.placed or born):
+            self._make_room()
         self.placed = False
 
     def _births_due(self) -> bool:
         return self.growing is not None and self.growing.due(self.done)
 
-    def _settle(self) -> None:
-        """Let the solver make room for bodies that were placed and for what was born."""
+    def _make_room(self) -> None:
+        """For bodies that were placed and for what was born."""
         if self.aged == 0:
             self.solver.refresh()  # the first time outside any graph
         if self._use_graphs:
-            self.scene.crew.run(f"settle {self.placed}", lambda: self.solver.settle(self.placed))
+            self.scene.crew.run(f"make room {self.placed}", lambda: self.solver.make_room(self.placed))
         else:
             self._wait()
-            self.solver.settle(self.placed)
+            self.solver.make_room(self.placed)
             self._wait()
 
     def march(self, dt: float, substeps: int) -> None:

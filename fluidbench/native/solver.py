@@ -25,7 +25,7 @@ class Solver(Method):
     faults: ClassVar[dict[int, str]] = {}
     arranges: int = 0  # ticks from one call of `arrange` to the next; 0 for never
     turns: int = 1  # calls of `arrange` until it does the same again
-    settles: bool = False  # whether it must be told when particles were put where others may be
+    makes_room: bool = False  # whether it must be told when particles were put where others may be
     backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
 
     @classmethod
@@ -70,10 +70,10 @@ class Solver(Method):
         densities to what that order tells; which is no motion of matter. `turn` counts the calls, from 0 to `turns` - 1
         and again."""
 
-    def settle(self, placed: bool) -> None:
-        """Enqueue, if it `settles`, between substeps and recorded like them, when bodies were `placed`, whose particles
-        may lie at random or within others, or parents had children, which lie over others. A method whose pressure is
-        finite lets it push them apart."""
+    def make_room(self, placed: bool) -> None:
+        """Enqueue, if it `makes_room`, between substeps and recorded like them, when bodies were `placed`, whose
+        particles may lie at random or within others, or parents had children, which lie over others. A method whose
+        pressure is finite lets it push them apart."""
 
     def carried(self) -> dict[str, Any]:
         """Arrays beyond the pool's that later substeps depend on, by name: what a checkpoint must hold."""

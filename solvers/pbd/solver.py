@@ -48,7 +48,7 @@ class SolverPBD(Solver):
     name = "pbd"
     rank = 3
     paradigm = "particles projected onto constraints; velocity follows from the change of position"
-    shares_threads = settles = True
+    shares_threads = makes_room = True
     features = frozenset(Feature)
     backends: ClassVar = tuple(BACKENDS)
     lacking: ClassVar = LACKING
@@ -200,7 +200,7 @@ class SolverPBD(Solver):
             self.correct()
             self.apply()
 
-    def settle(self, placed: bool) -> None:
+    def make_room(self, placed: bool) -> None:
         """What was born or placed where others are is moved apart in no time: pushed in a substep it would be flung
         (the pre-stabilisation of Macklin et al. 2014). All worlds of a batch are pressed, those without offspring by
         what little their density is off."""
