@@ -66,7 +66,10 @@ def evaluate(runs: dict[str, Run]) -> Finding:
     thin = WEIGHT * RISE - (1.0 + SPREAD) * math.sqrt(3.0) * RATES["weak"]
     wanted = RISE * (1.0 + SPREAD) * math.sqrt(3.0) * YIELD / thin
     yielded = np.flatnonzero(foot > SPREAD)
-    seen = RISE * float(clock[yielded[0]]) if len(yielded) else math.inf
+    seen = math.inf
+    if len(yielded):  # the first is not the beginning, at which nothing has spread
+        between = slice(yielded[0] - 1, yielded[0] + 1)
+        seen = RISE * float(np.interp(SPREAD, foot[between], clock[between]))
     held = float(spread_of(runs["strong"]).max())
     layer = 2.0 * runs["weak"].scenario.spacing
     error = max(abs(seen - wanted) - layer, 0.0) / wanted if held < SPREAD else math.inf

@@ -73,6 +73,7 @@ def move(
     mass: Floats,
     volume: Floats,
     acceleration: Vectors,
+    tensile: int,
     new_density: Floats,
     shift: Vectors,
     position: Vectors,
@@ -91,7 +92,8 @@ def move(
                 phase = phase_at(phases, world, phase_of[i])
                 weight = force_at(force, world, position[i]) - acceleration[i]
                 carried = 0.5 * rest * rest / phase.bulk_modulus * weight
-            carried_gradient[i] = carried
+            if tensile == 0:
+                carried_gradient[i] = carried
             free = position[i] + h * v
             if held[i] == FREE:
                 free += shift[i]

@@ -84,6 +84,7 @@ def move(
     mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     acceleration: wp.array(dtype=wp.vec3),
+    tensile: int,
     new_density: wp.array(dtype=float),
     shift: wp.array(dtype=wp.vec3),
     # outputs
@@ -97,6 +98,7 @@ def move(
 
     `carried_gradient` is half the density gradient of the pressure that carries the particle, rho^2 (g - a) / K: that
     of hydrostatic equilibrium for a liquid at rest (Fourtakas et al. 2019, Comput. Fluids 190:346), none in free fall.
+    What carries tension has it of `strain`: shear stress carries it, too.
     """
     i = index_of(share, wp.tid())
     world = i / capacity
@@ -110,7 +112,8 @@ def move(
             rest = rest_density(mass, volume, i)
             stiffness = 0.5 * rest * rest / phase.bulk_modulus
             carried = stiffness * (force_at(force[world], position[i]) - acceleration[i])
-        carried_gradient[i] = carried
+        if tensile == 0:
+            carried_gradient[i] = carried
         free = position[i] + h * v
         if held[i] == FREE:
             free += shift[i]

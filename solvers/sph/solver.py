@@ -199,6 +199,7 @@ class SolverSPH(Solver):
             if self.tool is not None:
                 data.tool = self.tool
         self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
+        self.straining.carried_gradient = pool.carried_gradient
         self.straining.shift, self.straining.flowing = self.shift, pool.flowing
         self.straining.growth = self.growth
         self.straining.plastic = plastic_strains(scene, pool)
@@ -304,6 +305,7 @@ class SolverSPH(Solver):
                 pool.mass,
                 pool.volume,
                 self.acceleration,
+                int(scene.tensile),
                 self.new_density,
                 self.shift,
             ],

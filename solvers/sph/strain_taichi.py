@@ -46,7 +46,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_warp import width_of
-from .particle import EVENED
+from .particle import EVENED, LEVELLED
 from .particle_taichi import SmoothingT, crowded, damped, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
@@ -64,7 +64,7 @@ def matter_seen(box, extra: ti.template(), row, j, code):
 def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
     """The kernel, see strain_warp.py."""
     width = width_of(strength, tensile, changing)
-    last, many = width - 4, 25 if strength else 22 if tensile else 17
+    last, many = width - 4, 28 if strength else 25 if tensile else 17
     write_state = writer(width)
 
     @ti.func
@@ -80,12 +80,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
         near = (kernel(r.norm() / num.h, num.h) / num.near) ** 4
         sums = vector_into(sums, 4, ti.max(near - 1.0, 0.0) * w * r)
         if ti.static(strength):
-            sums = vector_into(sums, 22, w * u)
+            sums = vector_into(sums, 25, w * u)
         sums = matrix_into(sums, 7, -w * u.outer_product(r))
         if ti.static(tensile):
             square = -w * r.outer_product(r)
             sums = vector_into(sums, 16, vec3(square[0, 0], square[1, 1], square[2, 2]))
             sums = vector_into(sums, 19, vec3(square[0, 1], square[0, 2], square[1, 2]))
+            sums = vector_into(sums, 22, (partner - own[7]) * w * r)
         else:
             sums[16] = -w * r.norm_sqr()
         return sums
@@ -115,6 +116,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
         new_density: Floats,
         state: Quads,
         shift: Vectors,
+        carried_gradient: Vectors,
         flowing: Floats,
         fault: Ints,
     ):
@@ -145,10 +147,11 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                     gradient = span @ gradient
                     approach = -rho * deformation.trace()
                     least = least_eigenvalue(moment / rho)
+                    carried_gradient[i] = 0.5 / rho * (correction @ vector_at(sums, 22))
                 sheared = shear_rate(gradient)
                 if ti.static(strength):
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
-                    off = (vector_at(sums, 22) - gradient @ first_moment) / rho
+                    off = (vector_at(sums, 25) - gradient @ first_moment) / rho
                     alone = ti.math.clamp((EDGE - least) / (EDGE - SOUND), 0.0, 1.0)
                     if least < SOUND:
                         off, z = vec3(0.0), vec3(0.0)
@@ -167,7 +170,10 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                     if ti.static(strength):
                         enclosed = ti.math.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
                         crowd += ti.select(grown, 1.0, EVENED) * enclosed / rho * first_moment
-                    inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
+                    rate = num.density_diffusion * sound / num.h
+                    if ti.static(tensile):
+                        rate = ti.min(rate, LEVELLED * sheared)
+                    inflow += 2.0 * num.h * num.h * rate * spread / rho
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
                 if flows or grown:

@@ -26,7 +26,7 @@ from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
-from .particle import EVENED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
+from .particle import EVENED, LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -53,6 +53,7 @@ class Straining:
     new_density: wp.array(dtype=float)
     state: wp.array(dtype=wp.vec4)  # rows of `force`
     shift: wp.array(dtype=wp.vec3)
+    carried_gradient: wp.array(dtype=wp.vec3)  # of what carries tension [kg/m^4]
     flowing: wp.array(dtype=float)  # rate of shear of what flows, which settles [1/s]
     fault: wp.array(dtype=int)
     tool: Tool
@@ -72,10 +73,12 @@ def seen_matter(box: Box, data: Straining, row: floats(MATTER), j: int, code: in
 def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> Pass:
     """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
-    Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners (see
-    `move`). Sums: diffusion, the first moment (3), crowding (3), the velocity gradient (9), the second moment (its
-    trace; of what carries tension xx yy zz xy xz yz), of what has strength also the motion off the mean of the
-    neighbours (3).
+    Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners: of what
+    cavitates by its acceleration (see `move`), of what carries tension, whose shear stress carries as well, half the
+    corrected gradient of density itself (Antuono et al. 2010), and it levels no faster than `LEVELLED` times the shear
+    that makes its noise. Sums: diffusion, the first moment (3), crowding (3), the velocity gradient (9), the second
+    moment (its trace; of what carries tension xx yy zz xy xz yz, and the gradient of density (3)), of what has strength
+    also the motion off the mean of the neighbours (3).
 
     What shears is told by the gradient alone, a liquid's uncorrected, which a free surface halves. All relative motion,
     noise included, made noise feed on itself: rows on a slip wall were held up by shifting as fast as they fell.
@@ -83,7 +86,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
     A plain sum takes it for expansion when a particle comes to the surface, out of a bore: tension pulled the skin of
     strands together by a fifth. A liquid that cavitates feels none, and needs no correction.
     """
-    sums_of = 25 if strength else 22 if tensile else 17
+    sums_of = 28 if strength else 25 if tensile else 17
     state_of = width_of(strength, tensile, changing) // 4
     Own, Other, Sums = floats(MATTER + 4), floats(MATTER), floats(sums_of)
 
@@ -117,11 +120,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             sums[19] = -m[0] * r[1]
             sums[20] = -m[0] * r[2]
             sums[21] = -m[1] * r[2]
+            for a in range(3):
+                sums[22 + a] = (partner - own[7]) * m[a]
         else:
             sums[16] = -w * r2
         if wp.static(strength):
             for a in range(3):
-                sums[22 + a] = w * u[a]
+                sums[25 + a] = w * u[a]
         return sums
 
     @wp.func
@@ -146,7 +151,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
                 sums[16] -= rho * wp.trace(found.second)
             if wp.static(strength):
                 for a in range(3):
-                    sums[22 + a] += u[a] * found.zeroth
+                    sums[25 + a] += u[a] * found.zeroth
         return sums
 
     @wp.func
@@ -183,6 +188,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             deformation = strain_by_chords(span, gradient, h)
             gradient = span * gradient
             inflow = -rho * wp.trace(deformation)
+            data.carried_gradient[i] = (0.5 / rho) * (correction * wp.vec3(sums[22], sums[23], sums[24]))
             least = least_eigenvalue(moment / rho)
         sheared = shear_rate(gradient)
         if wp.static(strength):
@@ -194,7 +200,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             if wp.static(changing):
                 inflow -= (1.0 - whole) * rho * data.growth[i]  # nothing is there that it would have to push away
             z = whole * data.off_linear[i]
-            q = (whole / rho) * (wp.vec3(sums[22], sums[23], sums[24]) - gradient * first_moment)
+            q = (whole / rho) * (wp.vec3(sums[25], sums[26], sums[27]) - gradient * first_moment)
             if data.held[i] != CARRIED:
                 turned = from_before(deformation, gradient, h)
                 b, s, kept = strained(phase, phase.shear_modulus, turned, b, s, h, i, data.plastic)
@@ -217,7 +223,10 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             # pressure to say so.
             inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
         if flows:
-            inflow += 2.0 * num.density_diffusion * num.h * sound * spread / rho
+            rate = num.density_diffusion * sound / num.h
+            if wp.static(tensile):
+                rate = wp.min(rate, LEVELLED * sheared)
+            inflow += 2.0 * num.h * num.h * rate * spread / rho
         rho += h * inflow
         if not (rho > -rest and rho < CRUSHED * rest):
             raise_fault(data.fault, FAULT_STATE)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fluidbench.method.target import Target
 from fluidbench.method.verdict import Verdict
 from fluidbench.native.pool import FAULT_ASTRAY, FAULT_STATE
 from fluidbench.native.simulation import Simulation
@@ -280,6 +281,49 @@ def test_pressure_does_the_work_of_the_density_that_it_comes_of(tension):
     work = -np.sum(mass * pressure / (rho * rho) * (rho - before) / dt)
     assert np.sum(mass[:, None] * v * a) == pytest.approx(work, rel=5e-3)
     assert np.abs(mass @ a).max() < 1e-4 * np.sum(mass * np.linalg.norm(a, axis=1))
+
+
+@pytest.mark.parametrize("backend", ["warp", "taichi"])
+@pytest.mark.parametrize(
+    "material", [{"viscosity": 1.0, "tension_limit": 1e6}, {"youngs_modulus": 2e4, "yield_stress": 1e-3}]
+)
+def test_densities_level_as_matter_shears_and_what_varies_evenly_stays(material, backend):
+    """Of what carries tension: what differs from particle to particle goes at a rate of shears; where nothing shears
+    nothing does, and an even gradient, whatever carries it, stays up to the faces."""
+    edge, uneven, gradient = 0.12, 20.0, 300.0
+    s = scenario(
+        domain={"lower": [-0.1] * 3, "upper": [edge + 0.1] * 3},
+        gravity=[0, 0, 0],
+        spacing=0.01,
+        bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}],
+        material={"density": 1000.0, "sound_speed": 160.0} | material,
+    )
+
+    def levelled(shear, unlike, even):
+        """By diffusion [kg/m^3/s], beside what densities are off [kg/m^3], and on or near how many faces each is."""
+        rates = []
+        for diffusion in (0.1, 0.0):
+            config = get_method("sph").Config(density_diffusion=diffusion, density_feedback=0.0, viscosity="explicit")
+            sim, dt = Simulation(s, "sph", Target("cpu", backend), config), 1e-5
+            x = sim.frame()["position"].astype(float)
+            rho = 1000.0 + even * (x[:, 0] - edge / 2) + unlike * (-1.0) ** np.rint(x.sum(axis=1) / 0.01)
+            for _ in range(2):  # the gradient is that of a substep before
+                sim.pool.density.assign(rho.astype(np.float32))
+                sim.kick(np.outer(x[:, 2], [shear, 0.0, 0.0]))
+                sim.march(dt, 1)
+            rates.append((sim.pool.density.numpy()[: len(x)].astype(float) - rho) / dt)
+        outside = np.abs(x - edge / 2) > edge / 2 - 0.031
+        return rates[0] - rates[1], rho - 1000.0, outside.sum(axis=1)
+
+    slow, off, faces = levelled(5.0, uneven, 0.0)
+    slow, off = slow[faces == 0], off[faces == 0]
+    fast = levelled(10.0, uneven, 0.0)[0][faces == 0]
+    assert (slow / off).max() < 0.0 and np.abs(slow / off).min() > 32 * 5.0 / 10
+    assert fast == pytest.approx(2.0 * slow, rel=0.05)
+    still = levelled(0.0, uneven, 0.0)[0]
+    assert np.abs(still).max() < 0.01 * np.abs(slow).max()
+    even, slope, faces = levelled(5.0, 0.0, gradient)
+    assert np.abs(even[faces < 3]).max() < 1e-3 * np.abs(slow / off).max() * np.abs(slope).max()  # but in corners
 
 
 @pytest.mark.parametrize(("crowded", "pushed"), [(1.3, True), (1.05, False), (0.8, False)])
