@@ -1,4 +1,4 @@
-"""How MPM's pressure leaks where matter moves through the grid (docs/physics.md): one dimension, double precision.
+"""How MPM's pressure leaks where matter moves through the grid (docs/physics/mpm.md): one dimension, double precision.
 
 A lattice at J = 0.95 drifts through a periodic grid at 0.25 m/s. It gains no room, so that J should stay. Prints the
 share of its pressure that it loses (two minutes):

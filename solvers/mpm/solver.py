@@ -41,7 +41,7 @@ from .settling import TURNS, Settling
 from .tool import Held
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
-WORTH = 16.0  # times the substeps that explicit viscosity may take before implicit is cheaper, see physics.md
+WORTH = 16.0  # times the substeps explicit viscosity may take before implicit is cheaper: docs/physics/viscosity.md
 
 
 class SolverMPM(Solver):
