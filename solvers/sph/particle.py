@@ -15,10 +15,6 @@ from ..smoothing import wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-# By how much what flows and has not grown is evened out, over what has: by h^2 times shear. At four times that, columns
-# crept on by 0.7 % of their height in 3 s.
-EVENED = wp.constant(0.25)
-
 # The rate at which the density of what carries tension levels, at most, over shear. From 16 to 64 nothing changes; at 4
 # sections of strands were 2 % too large, without a limit pastes crept on for as long as they were watched.
 LEVELLED = wp.constant(32.0)

@@ -46,7 +46,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_warp import width_of
-from .particle import EVENED, LEVELLED
+from .particle import LEVELLED
 from .particle_taichi import SmoothingT, crowded, damped, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
@@ -169,7 +169,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 if flows:
                     if ti.static(strength):
                         enclosed = ti.math.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
-                        crowd += ti.select(grown, 1.0, EVENED) * enclosed / rho * first_moment
+                        crowd += enclosed / rho * first_moment
                     rate = num.density_diffusion * sound / num.h
                     if ti.static(tensile):
                         rate = ti.min(rate, LEVELLED * sheared)

@@ -26,7 +26,7 @@ from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
-from .particle import EVENED, LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
+from .particle import LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -212,7 +212,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         flows = flows and not is_solid(phase)
         if wp.static(strength):
             if flows:
-                crowd += wp.where(grown, 1.0, EVENED) * enclosed(least) * first_moment
+                crowd += enclosed(least) * first_moment
         crowd /= rho
         if not flows:
             crowd = broken(crowd, num.broken)

@@ -159,7 +159,7 @@ def test_only_near_partners_crowd_each_other(material, gap, moves):
     simulation.march(dt, 1)
     shift = simulation.solver.shift.numpy()[[first, second], 0].astype(float) / (4.0 * dt * 1.5**2)
     if not moves:
-        assert np.abs(shift).max() <= (0.005 if material is PASTE else 0.0)
+        assert np.abs(shift).max() <= (0.02 if material is PASTE else 0.0)
     else:
         assert shift[0] < 0.0 < shift[1]
     if gap == 0.5:  # what else is near adds little
