@@ -7,7 +7,7 @@ from fluidbench.scenario.stream import COLUMN
 
 from .grid import cells_of
 
-ACROSS = 6.0  # cells across a bore: with fewer its resistance can be off by more than 10 % (docs/physics/nozzle.md)
+ACROSS = 6.0  # cells across a bore: with fewer its resistance can be off by more than 10 % (docs/physics)
 
 
 def unpressed(scenario: Scenario, config: Any) -> str | None:
