@@ -34,11 +34,11 @@ def enclosed(least: float):
     """How far a particle is from any free surface [-], by the least eigenvalue of its moment: 1 where it has neighbours
     all round, 0 from halfway to a face on. (Marrone et al. 2010, J. Comput. Phys. 229:3652, tell surfaces by it.)
 
-    What has grown is evened out there (crowding.py), and in SPH what has strength and flows. Halves of
-    split particles lie as they were born, and no stress says where they should: a kernel three spacings wide does not
-    see how far above a floor a row is. Nothing held the lowest row of rising foam down; a gap of half a spacing opened
-    under it, and the foam slid off. Rows of paste that slide along a no-slip wall came nearer to their images than to
-    the next row, and carried 0.85 of the wall's stress.
+    What has grown is evened out there, and in SPH all that has strength and flows (crowding.py). The halves of split
+    particles lie as they were born, and no stress says where they should: a kernel three spacings wide does not see how
+    far above a floor a row is. Nothing held the lowest row of rising foam down; a gap of half a spacing opened under
+    it, and the foam slid off. Rows of paste that slide along a no-slip wall came nearer to their images than to the
+    next row, and carried 0.85 of the wall's stress.
     """
     return wp.clamp((least - LEANING) / (INSIDE - LEANING), 0.0, 1.0)
 

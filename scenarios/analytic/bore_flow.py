@@ -70,7 +70,7 @@ CASE = Case(
     "emission",
     "exact: Hagen-Poiseuille",
     "|dp/dz / (4 tau_w / D) - 1|",
-    spacing=DIAMETER / 12,  # with 8 across SPH's wall drags 10 % too much (docs/physics/nozzle.md)
+    spacing=DIAMETER / 12,  # with 8 across SPH's wall drags 10 % too much (docs/physics/sph.md)
     tolerance=0.10,
     scenarios=scenarios,
     evaluate=evaluate,

@@ -15,7 +15,7 @@ from ..smoothing import wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-# The rate at which the density of what carries tension levels, at most, over shear. From 16 to 64 nothing changes; at 4
+# The rate at which the density of what carries tension levels, at most, over shear. From 16 to 64 little changes; at 4
 # sections of strands were 2 % too large, without a limit pastes crept on for as long as they were watched.
 LEVELLED = wp.constant(32.0)
 

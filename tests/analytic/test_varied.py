@@ -66,7 +66,7 @@ def test_a_slumped_column_rests(stress, answer):
 @pytest.mark.parametrize("jitter", [0.0, 0.05])
 def test_a_slumped_column_of_sph_comes_to_rest(jitter):
     """It does not creep on: diffusion of its density, which took what shear stress carries for pressure that is not
-    there, moved it by half a percent of H a second."""
+    there, moved it by a quarter of a percent of H a second, and more."""
     column = load(
         "column_slump",
         {"spacing": 0.1 / 12, "duration": 3.0, "output_interval": 0.75, "jitter": jitter, "seed": 1},
