@@ -7,13 +7,13 @@ The direction is in rows for the operator to read: the first three of a particle
 import warp as wp
 
 from fluidbench.method.frame import FREE
-from fluidbench.native.crew import index_of, raise_fault
-from fluidbench.native.vector_access import joined, load_vec4, store_vec4
+from fluidbench.native.crew import BLOCK, index_of, raise_fault
+from fluidbench.native.vector_access import in_company, joined, joined_in_block, load_vec4, store_vec4
 
 wp.set_module_options({"enable_backward": False})  # no fast math: what is no number must end the iterations
 
-CHUNK = wp.constant(8)  # particles whose sums one thread adds up: results are the same on any number of threads
-TEAM = 32  # threads of a GPU that add up a world's chunks
+CHUNK = wp.constant(8)  # particles whose sums are added up first: results are the same on any number of threads
+TEAM = BLOCK  # threads of a GPU that add up a world's chunks: all of a block
 AHEAD = wp.constant(8)  # sums that each of them asks for at once: one by one it would wait for memory every time
 
 
@@ -36,6 +36,22 @@ class Totals:
     iterations: float  # of this solve
 
 
+@wp.func
+def chunk_of(thread: int):
+    """(chunk, its first particle of this thread, how many are this thread's): on the CPU all, on a GPU one."""
+    if in_company():
+        return thread / CHUNK, thread, 1
+    return thread, thread * CHUNK, CHUNK
+
+
+@wp.func
+def put_together(partial: wp.array(dtype=wp.vec2), chunk: int, first: int, left: float, right: float):
+    """The sums of a chunk from those of its threads; the whole warp must ask."""
+    both = wp.vec2(joined(left, CHUNK), joined(right, CHUNK))
+    if first == chunk * CHUNK:
+        partial[chunk] = both
+
+
 @wp.kernel
 def residual_of(
     share: wp.vec3i,
@@ -52,13 +68,12 @@ def residual_of(
     past: wp.array(dtype=int),
 ):
     """r = v* - K v, the first direction; sums of m r.r and of m v*.v*; where each world's chunks in use end."""
-    chunk = index_of(share, wp.tid())
-    first = chunk * CHUNK
+    chunk, first, lanes = chunk_of(index_of(share, wp.tid()))
     world = first / capacity
     if first == world * capacity:
         past[world] = chunk + (count[world] + CHUNK - 1) / CHUNK
     left, right = float(0.0), float(0.0)
-    for lane in range(CHUNK):
+    for lane in range(lanes):
         i = first + lane
         if i - world * capacity < count[world]:
             r = wp.vec3(0.0, 0.0, 0.0)
@@ -69,7 +84,7 @@ def residual_of(
             store_vec4(rows, 3 * i + 1, wp.vec4(r[0], r[1], r[2], row[3]))
             left += mass[i] * wp.dot(r, r)
             right += mass[i] * wp.dot(aim[i], aim[i])
-    partial[chunk] = wp.vec2(left, right)
+    put_together(partial, chunk, first, left, right)
 
 
 @wp.kernel
@@ -84,16 +99,15 @@ def along(
     partial: wp.array(dtype=wp.vec2),
 ):
     """Sums of m p.Kp."""
-    chunk = index_of(share, wp.tid())
-    first = chunk * CHUNK
+    chunk, first, lanes = chunk_of(index_of(share, wp.tid()))
     world = first / capacity
     total = float(0.0)
-    for lane in range(CHUNK):
+    for lane in range(lanes):
         i = first + lane
         if i - world * capacity < count[world]:
             p = load_vec4(rows, 3 * i + 1)
             total += mass[i] * wp.dot(wp.vec3(p[0], p[1], p[2]), image[i])
-    partial[chunk] = wp.vec2(total, 0.0)
+    put_together(partial, chunk, first, total, 0.0)
 
 
 @wp.kernel
@@ -111,12 +125,11 @@ def descend(
     partial: wp.array(dtype=wp.vec2),
 ):
     """v += alpha p, r -= alpha K p; sums of m r.r."""
-    chunk = index_of(share, wp.tid())
-    first = chunk * CHUNK
+    chunk, first, lanes = chunk_of(index_of(share, wp.tid()))
     world = first / capacity
     step = totals[world].step
     total = float(0.0)
-    for lane in range(CHUNK):
+    for lane in range(lanes):
         i = first + lane
         if i - world * capacity < count[world]:
             p = load_vec4(rows, 3 * i + 1)
@@ -124,7 +137,7 @@ def descend(
             r = residual[i] - step * image[i]
             residual[i] = r
             total += mass[i] * wp.dot(r, r)
-    partial[chunk] = wp.vec2(total, 0.0)
+    put_together(partial, chunk, first, total, 0.0)
 
 
 @wp.kernel
@@ -155,12 +168,12 @@ def summed(partial: wp.array(dtype=wp.vec2), first: int, end: int, member: int, 
     while k < end:
         for lane in range(AHEAD):
             at = k + lane * team
+            value = partial[wp.min(at, end - 1)]  # behind a condition each would be waited for
             if at < end:
-                value = partial[at]
                 left += wp.float64(value[0])
                 right += wp.float64(value[1])
         k += AHEAD * team
-    return wp.vec2(joined(float(left), team), joined(float(right), team))
+    return wp.vec2(joined_in_block(float(left)), joined_in_block(float(right)))
 
 
 @wp.func

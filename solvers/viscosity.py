@@ -114,12 +114,13 @@ class ImplicitViscosity:
         self.drag = pool.add_field("drag", wp.vec3)
         self.elastic = [int(kept is not None), pool.volume if kept is None else kept]
         worlds = len(scene.scenarios)
-        self.chunks = pool.capacity // CHUNK
+        chunks = pool.capacity // CHUNK
+        self.summing = worlds * chunks if scene.device.is_cpu else pool.size
         with wp.ScopedDevice(scene.device):
             self.rows = wp.zeros(pool.size * kernels.DIRECTION // 4, dtype=wp.vec4)
             self.aim, self.trial, self.image, self.residual = (wp.zeros(pool.size, dtype=wp.vec3) for _ in range(4))
-            self.partial = wp.zeros(worlds * self.chunks, dtype=wp.vec2)
-            begin = wp.array([world * self.chunks for world in range(worlds)], dtype=int)
+            self.partial = wp.zeros(worlds * chunks, dtype=wp.vec2)
+            begin = wp.array([world * chunks for world in range(worlds)], dtype=int)
             self.past = wp.zeros(worlds, dtype=int)
         self.iterations = Iterations(backend, self.kernels, tolerance, begin, self.past, self.partial)
         self.applying = kernels.Applying()
@@ -151,7 +152,7 @@ class ImplicitViscosity:
             self._particles("give_growth", [pool.growth], [self.rows])
             self._over_pairs("growing")
         inputs = [pool.held, pool.mass, self.aim, self.image]
-        self._particles("residual_of", inputs, [self.residual, self.rows, self.partial, self.past], self.chunks)
+        self._particles("residual_of", inputs, [self.residual, self.rows, self.partial, self.past], self.summing)
         self.iterations.begin_with()
         self.iterations.repeat(self._iterate)
         ends = [scene.dt, pool.held, self.aim, self.trial, self.residual, int(impulse)]
@@ -163,10 +164,10 @@ class ImplicitViscosity:
         """One step of conjugate gradients; `image` is the image K p of the direction p."""
         mass, search = self.pool.mass, [self.rows, self.image]
         self._over_pairs("image")
-        self._particles("along", [mass, *search], [self.partial], self.chunks)
+        self._particles("along", [mass, *search], [self.partial], self.summing)
         self.iterations.step()
         moved = [self.trial, self.residual, self.partial]
-        self._particles("descend", [mass, *search, self.iterations.totals], moved, self.chunks)
+        self._particles("descend", [mass, *search, self.iterations.totals], moved, self.summing)
         self.iterations.turn()
         self._particles("turn", [self.iterations.totals, self.residual], [self.rows])
 
@@ -175,11 +176,10 @@ class ImplicitViscosity:
         common = [self.num, self.scene.box, lists.lists, pool.capacity, pool.count]
         self._launch(name, lists.work, [*common, self.rows, self.applying], [])
 
-    def _particles(self, name: str, inputs: list[Any], outputs: list[Any], chunks: int = 0) -> None:
-        """By particle, or by chunks of them."""
+    def _particles(self, name: str, inputs: list[Any], outputs: list[Any], size: int = 0) -> None:
+        """By particle, or by what adds up chunks of them."""
         pool = self.pool
-        size = len(self.scene.scenarios) * chunks or pool.size
-        self._launch(name, size, [pool.capacity, pool.count, *inputs], outputs)
+        self._launch(name, size or pool.size, [pool.capacity, pool.count, *inputs], outputs)
 
     def _launch(self, name: str, size: int, inputs: list[Any], outputs: list[Any]) -> None:
         self.backend.launch(getattr(self.kernels, name), size, inputs, outputs)

@@ -80,6 +80,25 @@ def joined(value: float, threads: int) -> float:
 @wp.func_native(
     snippet="""
 #if defined(__CUDA_ARCH__)
+    __shared__ float warps[32];
+    for (int o = 16; o > 0; o >>= 1) value += __shfl_xor_sync(0xffffffffu, value, o);
+    __syncthreads();
+    if ((threadIdx.x & 31) == 0) warps[threadIdx.x >> 5] = value;
+    __syncthreads();
+    value = 0.0f;
+    for (int w = 0; w < (int)(blockDim.x >> 5); ++w) value += warps[w];
+#endif
+    return value;
+"""
+)
+def joined_in_block(value: float) -> float:
+    """The sum over all threads of a block, whole warps, all of which must ask; on the CPU a thread is a block."""
+    ...
+
+
+@wp.func_native(
+    snippet="""
+#if defined(__CUDA_ARCH__)
     const int lane = threadIdx.x & 31;
     const unsigned all = __ballot_sync(0xffffffffu, yes) >> (lane & ~(threads - 1));
     __syncwarp();
