@@ -15,8 +15,8 @@ from ..smoothing import wendland_slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-# The rate at which the density of what carries tension levels, at most, over shear. From 16 to 64 little changes; at 4
-# sections of strands were 2 % too large, without a limit pastes crept on for as long as they were watched.
+# The rate at which the density of what carries tension levels, at most, over shear and growth. From 16 to 64 little
+# changes; at 4 sections of strands were 2 % too large; without a limit pastes crept on for as long as anyone looked.
 LEVELLED = wp.constant(32.0)
 
 slope = warp_func(wendland_slope)

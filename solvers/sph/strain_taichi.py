@@ -172,7 +172,10 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                         crowd += enclosed / rho * first_moment
                     rate = num.density_diffusion * sound / num.h
                     if ti.static(tensile):
-                        rate = ti.min(rate, LEVELLED * sheared)
+                        stirred = sheared
+                        if ti.static(changing):
+                            stirred += growth[i]
+                        rate = ti.min(rate, LEVELLED * stirred)
                     inflow += 2.0 * num.h * num.h * rate * spread / rho
                 else:
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)

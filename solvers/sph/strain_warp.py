@@ -76,9 +76,9 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners: of what
     cavitates by its acceleration (see `move`), of what carries tension, whose shear stress carries as well, half the
     corrected gradient of density itself (Antuono et al. 2010), and it levels no faster than `LEVELLED` times the shear
-    that makes its noise. Sums: diffusion, the first moment (3), crowding (3), the velocity gradient (9), the second
-    moment (its trace; of what carries tension xx yy zz xy xz yz, and the gradient of density (3)), of what has strength
-    also the motion off the mean of the neighbours (3).
+    and the growth that make its noise. Sums: diffusion, the first moment (3), crowding (3), the velocity gradient (9),
+    the second moment (its trace; of what carries tension xx yy zz xy xz yz, and the gradient of density (3)), of what
+    has strength also the motion off the mean of the neighbours (3).
 
     What shears is told by the gradient alone, a liquid's uncorrected, which a free surface halves. All relative motion,
     noise included, made noise feed on itself: rows on a slip wall were held up by shifting as fast as they fell.
@@ -225,7 +225,10 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if flows:
             rate = num.density_diffusion * sound / num.h
             if wp.static(tensile):
-                rate = wp.min(rate, LEVELLED * sheared)
+                stirred = float(sheared)
+                if wp.static(changing):
+                    stirred += data.growth[i]
+                rate = wp.min(rate, LEVELLED * stirred)
             inflow += 2.0 * num.h * num.h * rate * spread / rho
         rho += h * inflow
         if not (rho > -rest and rho < CRUSHED * rest):

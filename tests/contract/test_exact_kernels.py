@@ -287,26 +287,28 @@ def test_pressure_does_the_work_of_the_density_that_it_comes_of(tension):
 @pytest.mark.parametrize(
     "material", [{"viscosity": 1.0, "tension_limit": 1e6}, {"youngs_modulus": 2e4, "yield_stress": 1e-3}]
 )
-def test_densities_level_as_matter_shears_and_what_varies_evenly_stays(material, backend):
-    """Of what carries tension: what differs from particle to particle goes at a rate of shears; where nothing shears
-    nothing does, and an even gradient, whatever carries it, stays up to the faces."""
+def test_densities_level_as_matter_shears_or_grows_and_what_varies_evenly_stays(material, backend):
+    """Of what carries tension: what differs from particle to particle goes at a rate of shears and growth; where
+    nothing shears nothing does, and an even gradient, whatever carries it, stays up to the faces."""
     edge, uneven, gradient = 0.12, 20.0, 300.0
-    s = scenario(
-        domain={"lower": [-0.1] * 3, "upper": [edge + 0.1] * 3},
-        gravity=[0, 0, 0],
-        spacing=0.01,
-        bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}],
-        material={"density": 1000.0, "sound_speed": 160.0} | material,
-    )
 
-    def levelled(shear, unlike, even):
+    def levelled(shear, unlike, even, growth=None):
         """By diffusion [kg/m^3/s], beside what densities are off [kg/m^3], and on or near how many faces each is."""
-        rates = []
+        rates, foams = [], {} if growth is None else {"expansion": {"ratio": 2.0, "delay": 9.0}}
+        s = scenario(
+            domain={"lower": [-0.1] * 3, "upper": [edge + 0.1] * 3},
+            gravity=[0, 0, 0],
+            spacing=0.01,
+            bodies=[{"kind": "box", "center": [edge / 2] * 3, "size": [edge] * 3}],
+            material={"density": 1000.0, "sound_speed": 160.0} | material | foams,
+        )
         for diffusion in (0.1, 0.0):
             config = get_method("sph").Config(density_diffusion=diffusion, density_feedback=0.0, viscosity="explicit")
             sim, dt = Simulation(s, "sph", Target("cpu", backend), config), 1e-5
             x = sim.frame()["position"].astype(float)
             rho = 1000.0 + even * (x[:, 0] - edge / 2) + unlike * (-1.0) ** np.rint(x.sum(axis=1) / 0.01)
+            if growth is not None:
+                sim.pool.growth.fill_(growth)
             for _ in range(2):  # the gradient is that of a substep before
                 sim.pool.density.assign(rho.astype(np.float32))
                 sim.kick(np.outer(x[:, 2], [shear, 0.0, 0.0]))
@@ -320,6 +322,8 @@ def test_densities_level_as_matter_shears_and_what_varies_evenly_stays(material,
     fast = levelled(10.0, uneven, 0.0)[0][faces == 0]
     assert (slow / off).max() < 0.0 and np.abs(slow / off).min() > 32 * 5.0 / 10
     assert fast == pytest.approx(2.0 * slow, rel=0.05)
+    foam = [levelled(shear, uneven, 0.0, growth)[0][faces == 0] for shear, growth in ((5.0, 5.0), (10.0, 0.0))]
+    assert foam[0] == pytest.approx(foam[1], rel=0.05)
     still = levelled(0.0, uneven, 0.0)[0]
     assert np.abs(still).max() < 0.01 * np.abs(slow).max()
     even, slope, faces = levelled(5.0, 0.0, gradient)
