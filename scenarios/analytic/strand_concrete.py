@@ -85,9 +85,9 @@ CASE = Case(
     evaluate=evaluate,
     skipped={"mpm": "its flow along a body is not stable for a paste"},
     causes={
-        "sph": "7 to 20 % too wide at D / 12: a dome with a wide foot where printed strands bulge. Neither gravity, "
-        "stiffness, yield stress, consistency nor the tip's size changes it, the spacing little (1.93, 1.91, 1.87 D of "
-        "1.59 at D / 8, 12, 16), and PBD's is wide, too: it may be the law's, or the walls'",
+        "sph": "5 to 11 % too wide: a dome with a wide foot where printed strands bulge. Neither gravity, stiffness, "
+        "yield stress, consistency nor the tip's size changes the shape, and PBD's is wide, too: it may be the law's, "
+        "or the walls'",
         "pbd": "11 to 16 % too wide at D / 12, a dome as SPH's",
     },
 )
