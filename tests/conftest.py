@@ -15,6 +15,8 @@ quiet_warp()
 G = 9.81
 NATIVE = [name for name in method_names() if issubclass(get_method(name), Solver)]
 """Methods on our own pool, in order; those of engines are tested in tests/contract/test_engines.py."""
+PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
+"""The walls of a domain that has none."""
 
 
 def drive(session: Any, observe: Any = None, **more: Any) -> Any:

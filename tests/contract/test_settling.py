@@ -7,7 +7,7 @@ import pytest
 from fluidbench.native.simulation import Simulation
 from solvers.mpm.settling import COMPRESSED
 
-from ..conftest import scenario
+from ..conftest import PERIODIC, scenario
 
 EDGE, D, CALLS = 0.16, 0.01, 20
 PASTE = {"density": 1000.0, "youngs_modulus": 1e4, "poisson_ratio": 0.45, "yield_stress": 100.0}
@@ -16,9 +16,8 @@ LIQUID = {"density": 1000.0, "viscosity": 1.0}
 
 def block(material, high=EDGE, ratio=2.0):
     """A block between periodic faces, filled up to a height, at its start."""
-    sides = {f"{axis}_{side}": "periodic" for axis in "xyz" for side in ("lower", "upper")}
     s = scenario(
-        domain={"lower": [0.0] * 3, "upper": [EDGE] * 3, "walls": sides},
+        domain={"lower": [0.0] * 3, "upper": [EDGE] * 3, "walls": PERIODIC},
         bodies=[{"kind": "box", "center": [EDGE / 2, EDGE / 2, high / 2], "size": [EDGE, EDGE, high]}],
         gravity=[0, 0, 0],
         spacing=D,

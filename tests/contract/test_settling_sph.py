@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from fluidbench.native.simulation import Simulation
 from solvers.sph.settling import AVERAGED, LENGTHENED, SURFACE
 
-from ..conftest import scenario
+from ..conftest import PERIODIC, scenario
 
 EDGE, D, CALLS = 0.2, 0.01, 40
 LIQUID = {"density": 1000.0, "viscosity": 1.0}
@@ -56,9 +56,8 @@ def settled(
     `lacking` is the share of particles that are not there; `moved` [d] how far all lie off their places, anew every so
     many calls if `renewed`; `flowing` the share of particles that do. The box has a floor this much higher, if at all.
     """
-    faces = {f"{axis}_{side}": "periodic" for axis in "xyz" for side in ("lower", "upper")}
     s = scenario(
-        domain={"lower": [0.0, 0.0, floor], "upper": [EDGE] * 3, "walls": faces | (FLOOR if floor else {})},
+        domain={"lower": [0.0, 0.0, floor], "upper": [EDGE] * 3, "walls": PERIODIC | (FLOOR if floor else {})},
         bodies=[
             {"kind": "box", "center": [EDGE / 2, EDGE / 2, (EDGE + floor) / 2], "size": [EDGE, EDGE, EDGE - floor]}
         ],
