@@ -1,33 +1,26 @@
-"""Two strands of mortar, one over the other, pressed by a nozzle's flat tip: how wide and how high the lower one is
-once the second lies on it."""
+"""Two strands of mortar, one over the other, pressed by a nozzle's flat tip: how wide the lower one is, and how high
+the notch in the outline of both, where they meet. The reference foretells outlines; it knows of no face within."""
 
 import math
-from typing import Any
 
 import numpy as np
 
-from fluidbench.measure.deposit import Deposit, Section, cut
+from fluidbench.measure.deposit import Section, cut
+from fluidbench.measure.ledger import deposit_of
 from fluidbench.measure.reference import table
-from fluidbench.measure.tower import layer_of
-from fluidbench.method.frame import Frame
 from fluidbench.scenario import Scenario
 from fluidbench.scenario.library import define
 from fluidbench.study.case import Case, Finding, Number, Run
 
-# A strand fits into its own width and height: where these are published as less than its matter, by 5 to 14 % in four
-# of the six rows that are usable else, nothing that keeps its volume can have both.
-PUBLISHED = (
-    table("strand_two_layers_rizzieri")
-    .query("usable == 'yes' and w1_mm * h1_mm >= mass_balance_area_mm2 / 2")
-    .set_index("id")
-    .T.to_dict()
-)
+PUBLISHED = table("strand_two_layers_rizzieri").set_index("id").query("usable == 'yes'").T.to_dict()
 LENGTH = 7.0  # of a strand, over D
 MIDDLE = (2.75, 4.25, 7)  # from and to, over D, and how many sections between: both ends are far
 # Times faster than printed, at a viscosity as much lower: stress over yield stress is as it was, but for inertia, which
 # is rho V^2 = 54 Pa at most.
 HASTE = 4.0
 TOLERANCE = 0.15
+COLUMNS = {"width": "w1", "height": "h1", "contact": "contact"}
+UNITS = {"area": "m^2"}
 
 
 def scenarios(spacing: float) -> dict[str, Scenario]:
@@ -73,37 +66,43 @@ def strands(name: str, spacing: float) -> Scenario:
     )
 
 
-def sections(frame: Frame, scenario: Scenario, matter: np.ndarray) -> list[Section]:
-    """Cuts through the middle of the path, of this matter alone (n,)."""
-    nozzle, domain = scenario.nozzle, scenario.domain
-    assert nozzle is not None
-    deposit = Deposit.of(frame["position"][matter], frame["volume"][matter], domain, scenario.spacing)
-    height = deposit.origin[2] + (deposit.fill.shape[2] - 0.5) * deposit.spacing
-    places = nozzle.diameter * np.linspace(*MIDDLE)
-    return [cut(deposit, np.array([x, 0.0]), np.array([1.0, 0.0]), domain.upper[1], height, 0.0) for x in places]
-
-
-def measured(run: Run) -> dict[str, float]:
-    """Of the lower strand its width and height, of both their area [m, m^2]; means over the middle."""
-    frame, scenario = run.frames[-1], run.scenario
-    layer = layer_of(frame, scenario)
-    lower, both = sections(frame, scenario, layer == 0), sections(frame, scenario, layer >= 0)
+def outline(section: Section, gap: float) -> dict[str, float]:
+    """Of two strands of height `gap` [m]: largest width below the notch, height and width of the notch, which is the
+    narrowest place from half way up the lower one to half way up the other, and the area of both [m, m^2]."""
+    widths = section.solid.sum(axis=0) * (section.across[1] - section.across[0])
+    within = np.flatnonzero((section.up > 0.5 * gap) & (section.up < 1.5 * gap))
+    narrowest = within[widths[within] == widths[within].min()]
+    below = widths[: narrowest[0] + 1]
     return {
-        "width": float(np.mean([s.width for s in lower])),
-        "height": float(np.mean([s.height for s in lower])),
-        "area": float(np.mean([s.area for s in both])),
+        "width": float(below.max()),
+        "height": float(section.up[narrowest].mean()),
+        "contact": float(widths[narrowest[0]]),
+        "area": section.area,
     }
 
 
+def measured(run: Run) -> dict[str, float]:
+    """Means over the middle of the path at the end of a run."""
+    scenario = run.scenario
+    nozzle, domain = scenario.nozzle, scenario.domain
+    assert nozzle is not None
+    deposit = deposit_of(run.frames[-1], scenario)
+    height = deposit.origin[2] + (deposit.fill.shape[2] - 0.5) * deposit.spacing
+    along, places = np.array([1.0, 0.0]), nozzle.diameter * np.linspace(*MIDDLE)
+    cuts = [cut(deposit, np.array([x, 0.0]), along, domain.upper[1], height, 0.0) for x in places]
+    found = [outline(section, nozzle.standoff) for section in cuts]
+    return {key: float(np.mean([each[key] for each in found])) for key in found[0]}
+
+
 def evaluate(runs: dict[str, Run]) -> Finding:
-    """The worst |w1 / w1_ref - 1| and |h1 / h1_ref - 1|."""
+    """The worst |w1 / w1_ref - 1| and |h1 / h1_ref - 1|; or |A / (2 Q / V) - 1|, where a strand is not whole."""
     errors, numbers = [], []
     for name, row in PUBLISHED.items():
         found = measured(runs[name])
-        wanted: dict[str, Any] = {"width": row["w1_mm"] / 1e3, "height": row["h1_mm"] / 1e3}
-        errors += [abs(found[key] / wanted[key] - 1.0) for key in wanted]
-        numbers += [Number(f"{key} of {name}'s lower strand [m]", found[key], wanted[key]) for key in wanted]
-        numbers.append(Number(f"area of {name}'s strands [m^2]", found["area"], row["mass_balance_area_mm2"] / 1e6))
+        wanted = {key: row[f"{column}_mm"] / 1e3 for key, column in COLUMNS.items()}
+        wanted["area"] = row["mass_balance_area_mm2"] / 1e6
+        errors += [abs(found[key] / wanted[key] - 1.0) for key in ("width", "height", "area")]
+        numbers += [Number(f"{key} of {name} [{UNITS.get(key, 'm')}]", found[key], wanted[key]) for key in wanted]
     return Finding(max(errors), tuple(numbers))
 
 
@@ -112,10 +111,16 @@ CASE = Case(
     "two strands of mortar, one over the other, pressed by a nozzle's flat tip",
     "emission",
     "network trained on particle finite elements, 1 to 15 % itself; Rizzieri et al. 2026",
-    "worst |w / w_ref - 1| and |h / h_ref - 1| of the lower strand, after the second",
+    "worst |w / w_ref - 1| of the lower strand and |h / h_ref - 1| of the notch between both",
     spacing=0.02 / 8,
     tolerance=TOLERANCE,
     scenarios=scenarios,
     evaluate=evaluate,
     skipped={"mpm": "its flow along a body is not stable for a paste"},
+    causes={
+        "sph": "the notch is 25 and 17 % too high in two of six rows (ID2, LM30), whose published outlines hold 14 and "
+        "6 % less than a strand's matter; all else within 14 %",
+        "pbd": "the notch is 17 % too high in one of six rows (LM30), whose published outline holds 6 % less than a "
+        "strand's matter; all else within 14 %",
+    },
 )

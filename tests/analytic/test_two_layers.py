@@ -1,4 +1,4 @@
-"""What strand_two_layers reads, of two strands whose sections are known."""
+"""What strand_two_layers reads, of two strands whose outline is known."""
 
 from types import SimpleNamespace
 
@@ -8,52 +8,58 @@ import pytest
 from fluidbench.method.frame import FREE
 from scenarios.analytic import strand_two_layers as case
 
-SPACING = 0.0025
+SPACING = 0.00125
+LOWER, NECK, UPPER = 0.030, 0.020, 0.028  # widths [m]
 
 
-def bar(scenario, wide, low, high):
-    """Particles of a bar along the path, as far as the middle is read."""
-    d = scenario.nozzle.diameter
-    sides = [(0.0, case.LENGTH * d), (-wide / 2, wide / 2), (low, high)]
-    return np.stack(np.meshgrid(*(np.arange(a + SPACING / 2, b, SPACING) for a, b in sides)), -1).reshape(-1, 3)
-
-
-def laid(name, lower, upper):
-    """A run that ended with bars of these widths and heights, (m, m), one on the other."""
+def laid(name, parts=((LOWER, 0.0, 0.75), (NECK, 0.75, 1.25), (UPPER, 1.25, 2.0)), past=0.0):
+    """A run that ended with bars on top of one another: their widths [m], from and to over the gap; what is above the
+    gap begins `past` [m]."""
     scenario = case.strands(name, SPACING)
-    parts = [bar(scenario, lower[0], 0.0, lower[1]), bar(scenario, upper[0], lower[1], lower[1] + upper[1])]
-    x = np.concatenate(parts)
-    turn = scenario.track.end / 2
+    d, gap = scenario.nozzle.diameter, scenario.nozzle.standoff
+    sizes = (case.LENGTH * d, 2.0 * max(wide for wide, _, _ in parts), parts[-1][2] * gap)
+    axes = [np.arange(SPACING / 2, size, SPACING) for size in sizes]
+    x = np.stack(np.meshgrid(*axes), -1).reshape(-1, 3) - [0.0, sizes[1] / 2, 0.0]
+    part = np.searchsorted([high * gap for _, _, high in parts], x[:, 2])
+    x = x[np.abs(x[:, 1]) < np.array([wide / 2 for wide, _, _ in parts])[part]]
+    x = x[(x[:, 2] < gap) | (x[:, 0] > past)]
     frame = {
         "time": np.array(scenario.duration),
         "position": x,
         "volume": np.full(len(x), SPACING**3),
         "held": np.full(len(x), FREE),
-        "birth_time": np.repeat([0.5 * turn, 1.5 * turn], [len(part) for part in parts]),
     }
     return SimpleNamespace(scenario=scenario, frames=[frame])
 
 
 @pytest.mark.parametrize("name", case.PUBLISHED)
-def test_each_strand_is_read_by_itself(name):
-    run = laid(name, (0.03, 0.01), (0.02, 0.015))
-    found = case.measured(run)
-    assert found["width"] == pytest.approx(0.03, abs=0.5 * SPACING)
-    assert found["height"] == pytest.approx(0.01, abs=0.5 * SPACING)
-    assert found["area"] == pytest.approx(0.03 * 0.01 + 0.02 * 0.015, rel=0.02)
+def test_the_notch_is_where_the_strands_meet(name):
+    run = laid(name)
+    gap, found = run.scenario.nozzle.standoff, case.measured(run)
+    assert found["height"] == pytest.approx(gap, abs=0.25 * SPACING)
+    assert found["width"] == pytest.approx(LOWER, abs=0.5 * SPACING)
+    assert found["contact"] == pytest.approx(NECK, abs=0.5 * SPACING)
+    assert found["area"] == pytest.approx(gap * (0.75 * LOWER + 0.5 * NECK + 0.75 * UPPER), rel=0.02)
 
 
-def test_an_error_is_that_of_the_worse_length():
-    """One strand as published, and one that is a fifth too wide."""
-    runs = {}
-    for name, row in case.PUBLISHED.items():
-        wide = row["w1_mm"] / 1e3 * (1.2 if name == "ID5" else 1.0)
-        runs[name] = laid(name, (wide, row["h1_mm"] / 1e3), (0.02, 0.01))
-    assert case.evaluate(runs).error == pytest.approx(0.2, abs=0.5 * SPACING / 0.0231)
+def published(name):
+    """Bars with the lower strand's width and notch as published, and the area of both strands."""
+    row, gap = case.PUBLISHED[name], case.PUBLISHED[name]["gap_mm"]
+    neck = row["h1_mm"] / gap
+    low, high = neck - 0.1, neck + 0.1
+    rest = row["mass_balance_area_mm2"] / gap - low * row["w1_mm"] - (high - low) * 0.8 * row["w1_mm"]
+    top = 1.9
+    upper = rest / (top - high)
+    parts = ((row["w1_mm"], 0.0, low), (min(0.8 * row["w1_mm"], 0.8 * upper), low, high), (upper, high, top))
+    return tuple((wide / 1e3, a, b) for wide, a, b in parts)
 
 
-def test_only_strands_are_judged_that_hold_their_matter():
-    """A width and a height that are less than a strand's section cannot both be right."""
-    assert len(case.PUBLISHED) >= 2
-    for row in case.PUBLISHED.values():
-        assert row["w1_mm"] * row["h1_mm"] > row["mass_balance_area_mm2"] / 2
+def test_what_is_as_published_passes_and_a_strand_that_is_too_wide_or_missing_does_not():
+    runs = {name: laid(name, published(name)) for name in case.PUBLISHED}
+    assert case.evaluate(runs).error < case.TOLERANCE / 2
+    wide = tuple((1.25 * w, a, b) for w, a, b in published("ID5"))
+    assert case.evaluate(runs | {"ID5": laid("ID5", wide)}).error > case.TOLERANCE
+    alone = published("ID5")[:1]
+    assert case.evaluate(runs | {"ID5": laid("ID5", alone)}).error > case.TOLERANCE
+    torn = laid("ID5", published("ID5"), past=0.075)
+    assert case.evaluate(runs | {"ID5": torn}).error > case.TOLERANCE
