@@ -105,7 +105,7 @@ CASE = Case(
     tolerance=1.0,
     scenarios=scenarios,
     evaluate=evaluate,
-    exempt={"pbd": "area 3 to 7 % too large, 0 to 6 % at D / 12, height at 0.8 D 15 and 6 %; it has no pressure"},
+    exempt={"pbd": "height at 0.6 D 9 to 12 % too large, all else as asked; it has no pressure"},
     causes={
         "sph": "at 1.0 D contact 30 % short, 12 % at D / 12, where the wedge beside it is finer than the deposit's "
         "resolution, and height then 7 to 8 % short",
