@@ -87,10 +87,10 @@ def measured(run: Run) -> dict[str, float]:
     nozzle, domain = scenario.nozzle, scenario.domain
     assert nozzle is not None
     deposit = deposit_of(run.frames[-1], scenario)
-    height = deposit.origin[2] + (deposit.fill.shape[2] - 0.5) * deposit.spacing
+    gap = nozzle.standoff
     along, places = np.array([1.0, 0.0]), nozzle.diameter * np.linspace(*MIDDLE)
-    cuts = [cut(deposit, np.array([x, 0.0]), along, domain.upper[1], height, 0.0) for x in places]
-    found = [outline(section, nozzle.standoff) for section in cuts]
+    cuts = [cut(deposit, np.array([x, 0.0]), along, domain.upper[1], 2.5 * gap, 0.0) for x in places]
+    found = [outline(section, gap) for section in cuts]
     return {key: float(np.mean([each[key] for each in found])) for key in found[0]}
 
 

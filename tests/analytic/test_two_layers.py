@@ -61,5 +61,7 @@ def test_what_is_as_published_passes_and_a_strand_that_is_too_wide_or_missing_do
     assert case.evaluate(runs | {"ID5": laid("ID5", wide)}).error > case.TOLERANCE
     alone = published("ID5")[:1]
     assert case.evaluate(runs | {"ID5": laid("ID5", alone)}).error > case.TOLERANCE
+    film = tuple((w, 0.1 * a, 0.1 * b) for w, a, b in published("ID5"))
+    assert case.evaluate(runs | {"ID5": laid("ID5", film)}).error > case.TOLERANCE
     torn = laid("ID5", published("ID5"), past=0.075)
     assert case.evaluate(runs | {"ID5": torn}).error > case.TOLERANCE
