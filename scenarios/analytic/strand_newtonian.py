@@ -72,7 +72,11 @@ def section(frame: Frame, scenario: Scenario) -> dict[str, float]:
 
 def steady(run: Run) -> dict[str, float]:
     """Mean over the last frames of a run."""
-    found = [section(frame, run.scenario) for frame in run.frames[-LAST:]]
+    return mean_of([section(frame, run.scenario) for frame in run.frames[-LAST:]])
+
+
+def mean_of(found: list[dict[str, float]]) -> dict[str, float]:
+    """Of sections, key by key."""
     return {key: float(np.mean([each[key] for each in found])) for key in found[0]}
 
 
