@@ -58,6 +58,16 @@ def face_kind(box: Box, code: int, axis: int):
 
 
 @wp.func
+def mirroring_faces(box: Box, code: int):
+    """1 for each axis on which the code mirrors in a wall."""
+    mirrors = wp.vec3(0.0, 0.0, 0.0)
+    for axis in range(3):
+        if face_kind(box, code, axis) != PERIODIC:
+            mirrors[axis] = 1.0
+    return mirrors
+
+
+@wp.func
 def rough_faces(box: Box, code: int):
     """1 for each axis on which the code mirrors in a friction wall."""
     rough = wp.vec3(0.0, 0.0, 0.0)

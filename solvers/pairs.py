@@ -21,7 +21,7 @@ from fluidbench.native.crew import BLOCK, index_of
 from fluidbench.native.scene import Box
 from fluidbench.native.vector_access import joined, load_int, load_vec4
 
-from .images import INDEX_BITS, INDEX_MASK, image_position, rough_faces
+from .images import INDEX_BITS, INDEX_MASK, image_position
 from .neighbours import LANES
 from .search import FAR, Lists
 
@@ -48,7 +48,12 @@ def alike(box: Box, data: Any, row: Any, j: int, code: int):
 
 
 @wp.func
-def unheld(rough: wp.vec3, sums: Any):
+def no_faces(box: Box, code: int):
+    return wp.vec3()
+
+
+@wp.func
+def as_summed(faces: wp.vec3, sums: Any):
     return sums
 
 
@@ -60,7 +65,8 @@ class Pass:
     - begin(num, data, world, i) -> vec4: what the particle itself brings to its pairs beyond its row
     - seen(box, data, row, j, code) -> row: an image's, whose position is in place already
     - pair(num, own, other, r) -> sums: r points from the neighbour; own has the row, then what `begin` gave
-    - held(rough, sums) -> sums: what an image adds; `rough` is 1 for each axis on which it lies behind a friction wall
+    - faces(box, code) -> vec3: what `across` asks of the walls that an image lies behind, found once an image
+    - across(faces, sums) -> sums: what an image adds, of what it would as a particle
     - finish(num, box, data, world, i, own, sums)
     """
 
@@ -72,7 +78,8 @@ class Pass:
     finish: Callable
     begin: Callable = nothing
     seen: Callable = alike
-    held: Callable = unheld
+    faces: Callable = no_faces
+    across: Callable = as_summed
 
     def compiled(self, name: str, cpu: bool) -> wp.Kernel:
         """The kernel, in a module of its own; launched with `work` threads (neighbours.py)."""
@@ -106,7 +113,8 @@ def _side_by_side(p: Pass) -> Callable:
     N, F = p.row, p.sums
     Own, Sums = floats(N + OWN), floats(F)
     Rows, Totals = (wp.types.matrix(shape=(k, LANES), dtype=float) for k in (N + OWN, F))
-    read, begin, seen, pair, held, finish = _reader(N), p.begin, p.seen, p.pair, p.held, p.finish
+    read, begin, seen, pair, finish = _reader(N), p.begin, p.seen, p.pair, p.finish
+    faces, across = p.faces, p.across
 
     def sweep(
         share: wp.vec3i,
@@ -156,14 +164,14 @@ def _side_by_side(p: Pass) -> Callable:
             for c in range(3):
                 other[c] = x[c]
             other = seen(box, data, other, j, code)
-            rough = rough_faces(box, code)
+            behind = faces(box, code)
             for lane in range(wp.static(LANES)):
                 own = Own()
                 for q in range(wp.static((N + OWN) // 4)):
                     for c in range(4):
                         own[4 * q + c] = owns[4 * q + c, lane]
                 r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
-                add = held(rough, pair(num, own, other, r))
+                add = across(behind, pair(num, own, other, r))
                 for q in range(wp.static(F // 4)):
                     for c in range(4):
                         totals[4 * q + c, lane] += add[4 * q + c]
@@ -187,7 +195,8 @@ def _in_teams(p: Pass) -> Callable:
     """Several threads for one particle, each with every so manieth neighbour."""
     N, F = p.row, p.sums
     Row, Own, Sums = floats(N), floats(N + OWN), floats(F)
-    read, begin, seen, pair, held, finish = _reader(N), p.begin, p.seen, p.pair, p.held, p.finish
+    read, begin, seen, pair, finish = _reader(N), p.begin, p.seen, p.pair, p.finish
+    faces, across = p.faces, p.across
 
     STEPS = min(max(ROWS_AHEAD // N, 1), 4)
     Others = wp.types.matrix(shape=(STEPS, N), dtype=float)
@@ -200,7 +209,7 @@ def _in_teams(p: Pass) -> Callable:
         return pair(num, own, other, r)
 
     @wp.func
-    def across(num: p.num, box: Box, data: p.data, own: Own, entry: int, other: Row):
+    def image(num: p.num, box: Box, data: p.data, own: Own, entry: int, other: Row):
         """What an image adds."""
         code = entry >> INDEX_BITS
         x = image_position(box, wp.vec3(other[0], other[1], other[2]), code)
@@ -208,7 +217,7 @@ def _in_teams(p: Pass) -> Callable:
             other[c] = x[c]
         other = seen(box, data, other, entry & INDEX_MASK, code)
         r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
-        return held(rough_faces(box, code), pair(num, own, other, r))
+        return across(faces(box, code), pair(num, own, other, r))
 
     def sweep(
         num: p.num,
@@ -262,7 +271,7 @@ def _in_teams(p: Pass) -> Callable:
             if entry == (entry & INDEX_MASK):
                 sums += inside(num, i, own, entry, other)
             else:
-                sums += across(num, box, data, own, entry, other)
+                sums += image(num, box, data, own, entry, other)
             k += lists.threads
             at += lists.column
         for c in range(wp.static(F)):

@@ -2,16 +2,19 @@
 
 from collections.abc import Callable
 
-from fluidbench.native.scene import FRICTION
-
 from .images import INDEX_BITS, INDEX_MASK
-from .neighbours_taichi import face_kind, image_position
+from .neighbours_taichi import image_position
 from .taichi_bridge import mat3, ti, vec3
 
 
 @ti.func
 def as_seen(box, extra: ti.template(), row, j, code):
     return row
+
+
+@ti.func
+def as_summed(box, code, sums):
+    return sums
 
 
 @ti.func
@@ -81,11 +84,12 @@ def writer(length: int) -> Callable:
     return write
 
 
-def over_pairs(length: int, sums: int, pair: Callable, seen: Callable = as_seen, rough: bool = False) -> Callable:
+def over_pairs(
+    length: int, sums: int, pair: Callable, seen: Callable = as_seen, across: Callable = as_summed
+) -> Callable:
     """The function that sums pair(num, own, begun, other, r) over the neighbours of a particle: `own` and `other` are
     rows of `length` floats, `begun` is what the particle brings beside, r points from the neighbour. An image's row is
-    seen(box, extra, row, j, code). With `rough`, what images in friction walls push along the normal goes to the last
-    three sums instead of the first."""
+    seen(box, extra, row, j, code), and what it adds across(box, code, sums)."""
     read = reader(length)
 
     @ti.func
@@ -112,11 +116,8 @@ def over_pairs(length: int, sums: int, pair: Callable, seen: Callable = as_seen,
                         box, extra, vector_into(other, 0, image_position(box, vector_at(other, 0), code)), j, code
                     )
                 add = pair(num, own, begun, other, vector_at(own, 0) - vector_at(other, 0))
-                if ti.static(rough):
-                    for axis in ti.static(range(3)):
-                        if code > 0 and face_kind(box, code, axis) == FRICTION:
-                            add[3 + axis] = add[axis]
-                            add[axis] = 0.0
+                if code > 0:
+                    add = across(box, code, add)
                 total += add
         return total
 

@@ -35,7 +35,7 @@ class ConfigSPH(Config):
     )
     shifting: NonNegative = Field(
         4.0,
-        description="shift out of a crowd, over strain and h^2 times its gradient; rate of settling, over shear",
+        description="rate of settling over shear; shift over strain and h^2 crowding, of what cavitates 12 times that",
     )
     density_feedback: NonNegative = Field(
         0.05,

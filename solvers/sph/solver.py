@@ -22,7 +22,7 @@ from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..crowding import crowding, nearest
 from ..flow import plastic_strains
-from ..lattice import lattice_moments, opposing, viscous_scale
+from ..lattice import lattice_moments, opposing, sloping, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..search import FAULT_NEIGHBOURS
@@ -35,7 +35,7 @@ from . import kernels_warp as kernels
 from .bounds import bounds_of
 from .config import ConfigSPH
 from .force_warp import Forcing, width_of
-from .particle import Smoothing
+from .particle import PARTED, Smoothing
 from .settling import TOLD, disorder
 from .settling_warp import Settling
 from .strain_warp import MATTER, Straining
@@ -143,7 +143,9 @@ class SolverSPH(Solver):
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.compact = (scene.spacing / opposing(ratio)) ** 2
-        self.num.hourglass, self.num.shifting = config.hourglass, config.shifting
+        self.num.hourglass = config.hourglass
+        self.num.shifting = config.shifting * (1.0 if scene.tensile else PARTED)
+        self.num.evened = scene.spacing**2 / float(sloping(ratio)[1].sum())
         self.num.density_feedback = config.density_feedback
         self.num.density_tolerance, self.num.disorder = config.density_tolerance, disorder(ratio)
         self.num.settling = config.shifting * scene.clock.tick
@@ -193,14 +195,14 @@ class SolverSPH(Solver):
         pool, scene = self.pool, self.scene
         self.straining, self.forcing, self.telling = Straining(), Forcing(), Settling()
         for data in (self.straining, self.forcing):
-            data.dt, data.new_density = scene.dt, self.new_density
+            data.dt, data.new_density, data.shift = scene.dt, self.new_density, self.shift
         for data in (self.straining, self.forcing, self.telling):
             data.phases, data.phase_of = scene.phases, pool.phase
             if self.tool is not None:
                 data.tool = self.tool
         self.straining.held, self.straining.fault, self.straining.state = pool.held, pool.fault, self.state
         self.straining.carried_gradient = pool.carried_gradient
-        self.straining.shift, self.straining.flowing = self.shift, pool.flowing
+        self.straining.flowing = pool.flowing
         self.straining.growth = self.growth
         self.straining.plastic = plastic_strains(scene, pool)
         for name, array in zip(STRAINS, self._strains(), strict=True):

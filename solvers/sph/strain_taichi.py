@@ -4,6 +4,7 @@ from typing import Any
 
 from fluidbench.method.frame import CARRIED
 from fluidbench.native.pool import FAULT_STATE
+from fluidbench.native.scene import PERIODIC
 
 from ..aging import GROWN
 from ..corrected import EDGE, INSIDE, LEANING, SOUND
@@ -18,7 +19,7 @@ from ..corrected_taichi import (
 from ..crowding import FARTHEST
 from ..flow_taichi import pressure, shear_rate, strained
 from ..hourglass_taichi import off_linear_after
-from ..neighbours_taichi import BoxT, ListsT, image_gradient, image_velocity
+from ..neighbours_taichi import BoxT, ListsT, face_kind, image_gradient, image_velocity
 from ..pairs_taichi import (
     matrix_into,
     over_pairs,
@@ -64,7 +65,7 @@ def matter_seen(box, extra: ti.template(), row, j, code):
 def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
     """The kernel, see strain_warp.py."""
     width = width_of(strength, tensile, changing)
-    last, many = width - 4, 28 if strength else 25 if tensile else 17
+    last, many = width - 4, 28 if strength else 22 if tensile else 14
     write_state = writer(width)
 
     @ti.func
@@ -76,22 +77,31 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
             w, partner, partner_gradient = w * relative, partner * relative, partner_gradient * relative
         sums = ti.Vector.zero(ti.f32, many)
         sums[0] = w * (own[7] - partner - (vector_at(own, 8) + partner_gradient).dot(r))
-        sums = vector_into(sums, 1, w * r)
         near = (kernel(r.norm() / num.h, num.h) / num.near) ** 4
-        sums = vector_into(sums, 4, ti.max(near - 1.0, 0.0) * w * r)
+        sums = vector_into(sums, 1, ti.max(near - 1.0, 0.0) * w * r)
         if ti.static(strength):
-            sums = vector_into(sums, 25, w * u)
-        sums = matrix_into(sums, 7, -w * u.outer_product(r))
+            sums = vector_into(vector_into(sums, 22, w * u), 25, w * r)
+        sums = matrix_into(sums, 4, -w * u.outer_product(r))
         if ti.static(tensile):
             square = -w * r.outer_product(r)
-            sums = vector_into(sums, 16, vec3(square[0, 0], square[1, 1], square[2, 2]))
-            sums = vector_into(sums, 19, vec3(square[0, 1], square[0, 2], square[1, 2]))
-            sums = vector_into(sums, 22, (partner - own[7]) * w * r)
+            sums = vector_into(sums, 13, vec3(square[0, 0], square[1, 1], square[2, 2]))
+            sums = vector_into(sums, 16, vec3(square[0, 1], square[0, 2], square[1, 2]))
+            sums = vector_into(sums, 19, (partner - own[7]) * w * r)
         else:
-            sums[16] = -w * r.norm_sqr()
+            sums[13] = -w * r.norm_sqr()
         return sums
 
-    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen)
+    @ti.func
+    def uncrowded(box, code, sums):
+        """Walls crowd no liquid that cavitates."""
+        out = sums
+        if ti.static(not tensile):
+            for axis in ti.static(range(3)):
+                if face_kind(box, code, axis) != PERIODIC:
+                    out = vector_into(out, 1, vec3(0.0))
+        return out
+
+    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen, uncrowded)
 
     @ti.kernel
     def strain(
@@ -131,14 +141,14 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                     sound *= ti.sqrt(phase.density / rest)
                 grown = rest < GROWN * phase.density
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
-                spread, first_moment = sums[0], vector_at(sums, 1)
-                second, alone, least, flows, h = sums[16], 0.0, 0.0, True, dt[world]
+                spread, first_moment = sums[0], vec3(0.0)
+                second, alone, least, flows, h = sums[13], 0.0, 0.0, True, dt[world]
                 deformation, correction, span = mat3(0.0), mat3(0.0), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
-                gradient = stressed(sums, 7) / rho
+                gradient = stressed(sums, 4) / rho
                 approach = -rho * gradient.trace()
                 if ti.static(tensile):
-                    moment = symmetric_at(sums, 16)
+                    moment = symmetric_at(sums, 13)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
                     gradient = gradient @ correction
@@ -147,11 +157,12 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                     gradient = span @ gradient
                     approach = -rho * deformation.trace()
                     least = least_eigenvalue(moment / rho)
-                    carried_gradient[i] = 0.5 / rho * (correction @ vector_at(sums, 22))
+                    carried_gradient[i] = 0.5 / rho * (correction @ vector_at(sums, 19))
                 sheared = shear_rate(gradient)
                 if ti.static(strength):
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
-                    off = (vector_at(sums, 25) - gradient @ first_moment) / rho
+                    first_moment = vector_at(sums, 25)
+                    off = (vector_at(sums, 22) - gradient @ first_moment) / rho
                     alone = ti.math.clamp((EDGE - least) / (EDGE - SOUND), 0.0, 1.0)
                     if least < SOUND:
                         off, z = vec3(0.0), vec3(0.0)
@@ -164,7 +175,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
                         z = off_linear_after(z, gradient, off, kept, h)
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
-                inflow, crowd = approach, vector_at(sums, 4) / rho
+                inflow, crowd = approach, vector_at(sums, 1) / rho
                 flows = flows and not is_solid(phase)
                 if flows:
                     if ti.static(strength):
@@ -210,6 +221,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                     row = matrix_into(row, 7, scale * (span @ cauchy @ correction))
                 else:
                     row[7] = scale * p
+                    row = vector_into(row, 8, shift[i])
                 if ti.static(changing):
                     row = vector_into(row, last, vec3(rho, rest, phase.viscosity))
                     row[last + 3] = sound

@@ -22,7 +22,7 @@ from ..corrected import (
 from ..crowding import excess, out_of_crowd
 from ..flow import pressure, shear_rate, strained
 from ..hourglass import off_linear
-from ..images import image_gradient, image_velocity
+from ..images import image_gradient, image_velocity, mirroring_faces
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
@@ -76,17 +76,18 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners: of what
     cavitates by its acceleration (see `move`), of what carries tension, whose shear stress carries as well, half the
     corrected gradient of density itself (Antuono et al. 2010), and it levels no faster than `LEVELLED` times the shear
-    and the growth that make its noise. Sums: diffusion, the first moment (3), crowding (3), the velocity gradient (9),
-    the second moment (its trace; of what carries tension xx yy zz xy xz yz, and the gradient of density (3)), of what
-    has strength also the motion off the mean of the neighbours (3).
+    and the growth that make its noise. Sums: diffusion, crowding (3), the velocity gradient (9), the second moment (its
+    trace; of what carries tension xx yy zz xy xz yz, and the gradient of density (3)), of what has strength also the
+    motion off the mean of the neighbours (3) and the first moment (3).
 
     What shears is told by the gradient alone, a liquid's uncorrected, which a free surface halves. All relative motion,
     noise included, made noise feed on itself: rows on a slip wall were held up by shifting as fast as they fell.
+    Walls crowd no liquid that cavitates, for the same reason.
 
     A plain sum takes it for expansion when a particle comes to the surface, out of a bore: tension pulled the skin of
     strands together by a fifth. A liquid that cavitates feels none, and needs no correction.
     """
-    sums_of = 28 if strength else 25 if tensile else 17
+    sums_of = 28 if strength else 22 if tensile else 14
     state_of = width_of(strength, tensile, changing) // 4
     Own, Other, Sums = floats(MATTER + 4), floats(MATTER), floats(sums_of)
 
@@ -109,24 +110,32 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         sums = Sums()
         sums[0] = spread
         for a in range(3):
-            sums[1 + a] = m[a]
-            sums[4 + a] = crowd[a]
+            sums[1 + a] = crowd[a]
         for a in range(3):
             for b in range(3):
-                sums[7 + 3 * a + b] = -u[a] * m[b]
+                sums[4 + 3 * a + b] = -u[a] * m[b]
         if wp.static(tensile):
             for a in range(3):
-                sums[16 + a] = -m[a] * r[a]
-            sums[19] = -m[0] * r[1]
-            sums[20] = -m[0] * r[2]
-            sums[21] = -m[1] * r[2]
+                sums[13 + a] = -m[a] * r[a]
+            sums[16] = -m[0] * r[1]
+            sums[17] = -m[0] * r[2]
+            sums[18] = -m[1] * r[2]
             for a in range(3):
-                sums[22 + a] = (partner - own[7]) * m[a]
+                sums[19 + a] = (partner - own[7]) * m[a]
         else:
-            sums[16] = -w * r2
+            sums[13] = -w * r2
         if wp.static(strength):
             for a in range(3):
-                sums[25 + a] = w * u[a]
+                sums[22 + a] = w * u[a]
+                sums[25 + a] = m[a]
+        return sums
+
+    @wp.func
+    def across(walls: wp.vec3, sums: Sums):
+        if wp.static(not tensile):
+            crowds = 1.0 - wp.max(walls)
+            for a in range(3):
+                sums[1 + a] = crowds * sums[1 + a]
         return sums
 
     @wp.func
@@ -137,21 +146,20 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             rho = own[7]
             u = rho * seen_by_tool(tool, found, wp.vec3(own[4], own[5], own[6]))
             for a in range(3):
-                sums[1 + a] += rho * found.first[a]
-            for a in range(3):
                 for b in range(3):
-                    sums[7 + 3 * a + b] -= u[a] * found.own[b]
+                    sums[4 + 3 * a + b] -= u[a] * found.own[b]
             if wp.static(tensile):
                 for a in range(3):
-                    sums[16 + a] -= rho * found.second[a, a]
-                sums[19] -= rho * found.second[0, 1]
-                sums[20] -= rho * found.second[0, 2]
-                sums[21] -= rho * found.second[1, 2]
+                    sums[13 + a] -= rho * found.second[a, a]
+                sums[16] -= rho * found.second[0, 1]
+                sums[17] -= rho * found.second[0, 2]
+                sums[18] -= rho * found.second[1, 2]
             else:
-                sums[16] -= rho * wp.trace(found.second)
+                sums[13] -= rho * wp.trace(found.second)
             if wp.static(strength):
                 for a in range(3):
-                    sums[25 + a] += u[a] * found.zeroth
+                    sums[22 + a] += u[a] * found.zeroth
+                    sums[25 + a] += rho * found.first[a]
         return sums
 
     @wp.func
@@ -167,19 +175,18 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if wp.static(tooled):
             sums = into_tool(data.tool, own, sums)
         spread = sums[0]
-        first_moment = wp.vec3(sums[1], sums[2], sums[3])
-        crowd = wp.vec3(sums[4], sums[5], sums[6])
-        second, least, alone = float(sums[16]), float(0.0), float(0.0)
+        crowd = wp.vec3(sums[1], sums[2], sums[3])
+        second, least, alone = float(sums[13]), float(0.0), float(0.0)
         flows = bool(True)
         deformation, correction, span = wp.mat33(), wp.mat33(), wp.mat33()
         gradient = wp.mat33(
-            sums[7], sums[8], sums[9], sums[10], sums[11], sums[12], sums[13], sums[14], sums[15]
+            sums[4], sums[5], sums[6], sums[7], sums[8], sums[9], sums[10], sums[11], sums[12]
         ) / rho  # fmt: skip
         inflow = -rho * wp.trace(gradient)
         if wp.static(tensile):
             # density from the corrected gradient, too: the same strain for pressure and for shear
             moment = wp.mat33(
-                sums[16], sums[19], sums[20], sums[19], sums[17], sums[21], sums[20], sums[21], sums[18]
+                sums[13], sums[16], sums[17], sums[16], sums[14], sums[18], sums[17], sums[18], sums[15]
             )  # fmt: skip
             second = wp.trace(moment)
             correction = symmetric_inverse(moment / rho)
@@ -188,10 +195,11 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             deformation = strain_by_chords(span, gradient, h)
             gradient = span * gradient
             inflow = -rho * wp.trace(deformation)
-            data.carried_gradient[i] = (0.5 / rho) * (correction * wp.vec3(sums[22], sums[23], sums[24]))
+            data.carried_gradient[i] = (0.5 / rho) * (correction * wp.vec3(sums[19], sums[20], sums[21]))
             least = least_eigenvalue(moment / rho)
         sheared = shear_rate(gradient)
         if wp.static(strength):
+            first_moment = wp.vec3(sums[25], sums[26], sums[27])
             b = data.elastic_normal[i]
             s = data.elastic_shear[i]
             # the gradient of a straggler is not exact even in a linear flow
@@ -200,7 +208,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             if wp.static(changing):
                 inflow -= (1.0 - whole) * rho * data.growth[i]  # nothing is there that it would have to push away
             z = whole * data.off_linear[i]
-            q = (whole / rho) * (wp.vec3(sums[25], sums[26], sums[27]) - gradient * first_moment)
+            q = (whole / rho) * (wp.vec3(sums[22], sums[23], sums[24]) - gradient * first_moment)
             if data.held[i] != CARRIED:
                 turned = from_before(deformation, gradient, h)
                 b, s, kept = strained(phase, phase.shear_modulus, turned, b, s, h, i, data.plastic)
@@ -217,7 +225,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if not flows:
             crowd = broken(crowd, num.broken)
         data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, damped(num, phase, rho, sheared), 0.0)
-        data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * h * sheared)
+        shift = out_of_crowd(crowd, num.h, num.shifting * h * sheared)
+        data.shift[i] = shift
         if flows or grown:
             # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with no
             # pressure to say so.
@@ -263,7 +272,10 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             store_vec4(data.state, at + 3, wp.vec4(t[1, 2], t[2, 0], t[2, 1], t[2, 2]))
         else:
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], scale * p))
+            store_vec4(data.state, at + 2, wp.vec4(shift[0], shift[1], shift[2], 0.0))
         if wp.static(changing):
             store_vec4(data.state, at + state_of - 1, wp.vec4(rho, rest, phase.viscosity, sound))
 
-    return Pass(Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter)
+    return Pass(
+        Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter, faces=mirroring_faces, across=across
+    )

@@ -34,12 +34,14 @@ PUSHES = [*PLACE, (4, 7), (7, 8)]
 BY_WIDTH = {
     "pushes": {12: [*PUSHES, (8, 9)], 16: [*PUSHES, (8, 14), (14, 15), (15, 16)]},
     "state": {
-        8: [*PLACE, VELOCITY, (7, 8)],
-        12: [*PLACE, VELOCITY, *((k, k + 1) for k in range(7, 12))],
         16: [*PLACE, VELOCITY, (7, 16)],
         20: [*PLACE, VELOCITY, (7, 16), *((k, k + 1) for k in range(16, 20))],
         24: [*PLACE, VELOCITY, (7, 16), (16, 19), *((k, k + 1) for k in range(20, 24))],
     },
+}
+CAVITATING = {  # what carries no tension
+    12: [*PLACE, VELOCITY, (7, 8), (8, 11)],
+    16: [*PLACE, VELOCITY, (7, 8), (8, 11), *((k, k + 1) for k in range(12, 16))],
 }
 
 
@@ -94,7 +96,8 @@ class Twins:
         sim = self.warp
         if self.method == "sph":
             speed, dt = float(np.abs(sim.pool.velocity.numpy()).max()), float(sim.scene.dt.numpy()[0])
-            return {"shift": sim.config.shifting * dt * speed / sim.scene.spacing * sim.solver.num.h}
+            shift = sim.solver.num.shifting * dt * speed / sim.scene.spacing * sim.solver.num.h
+            return {"shift": shift} | ({} if sim.scene.tensile else {"state[8:11]": shift})
         if self.method == "mpm":
             dt, volume = float(sim.scene.dt.numpy()[0]), float(sim.pool.volume.numpy().max())
             squeezed = float(np.abs(sim.pool.volume_ratio.numpy() - 1.0).max())
@@ -235,7 +238,8 @@ class Twins:
         if len(a) < size:  # not used by this scene
             return
         a, b = a.reshape(size, -1), b.reshape(size, -1)
-        for first, last in ROWS.get(name) or BY_WIDTH[name][a.shape[1]]:
+        cavitates = name == "state" and not self.warp.scene.tensile
+        for first, last in ROWS.get(name) or (CAVITATING if cavitates else BY_WIDTH[name])[a.shape[1]]:
             x, y = a[:, first:last], b[:, first:last]
             scale = max(float(np.abs(x).max()), self.least.get(f"{name}[{first}:{last}]", 1e-30))
             off = float(np.abs(x.astype(float) - y).max()) / scale

@@ -17,17 +17,18 @@ from solvers.hourglass import off_linear
 from solvers.lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from solvers.smoothing import wendland, wendland_slope
 from solvers.sph import particle
+from solvers.sph.particle import PARTED
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
 SIDE = 8
 
 
-def block(config=None, **material):
-    """A periodic cube of a lattice of 8 x 8 x 8 particles at rest, 1 m apart, and what runs it."""
+def block(config=None, walls=PERIODIC, **material):
+    """A cube of a lattice of 8 x 8 x 8 particles at rest, 1 m apart, periodic or within walls, and what runs it."""
     material = {"density": 1000.0, "youngs_modulus": 1e5, "poisson_ratio": 0.3} | material
     scenario = define(
         "block",
-        domain={"lower": [0, 0, 0], "upper": [SIDE] * 3, "walls": PERIODIC},
+        domain={"lower": [0, 0, 0], "upper": [SIDE] * 3, "walls": walls},
         bodies=[{"kind": "box", "center": [SIDE / 2] * 3, "size": [SIDE] * 3}],
         material={key: value for key, value in material.items() if value is not None},
         gravity=[0.0, 0.0, 0.0],
@@ -132,6 +133,16 @@ def test_particles_leave_a_crowd_as_fast_as_matter_shears():
     assert list(out_of_crowd(crowd, 0.5, 1e9)) == pytest.approx([-0.1, 0.0, 0.05])  # no farther
 
 
+def sheared(simulation, places):
+    """Shifts (n, 3) of particles at some places after a short step of a flow that shears at 1 1/s."""
+    pool = simulation.pool
+    pool.position.assign(np.pad(places, ((0, pool.size - len(places)), (0, 0))).astype(np.float32))
+    pool.stale = True
+    simulation.kick(np.stack([0 * places[:, 0], places[:, 2] % SIDE, 0 * places[:, 0]], axis=1))
+    simulation.march(1e-4, 1)
+    return simulation.solver.shift.numpy()[: len(places)].astype(float)
+
+
 PASTE = {"yield_stress": 1e-6}
 ELASTIC = {"yield_stress": 1e9}
 LIQUID = {"youngs_modulus": None, "poisson_ratio": None, "sound_speed": 10.0}
@@ -147,17 +158,12 @@ def test_only_near_partners_crowd_each_other(material, gap, moves):
     is evened out a little), what strains elastically to 0.6, and beyond it feels the excess."""
     config = {"shifting": 4.0, "smoothing_ratio_solid": 1.5, "smoothing_ratio": 1.5}
     simulation = block(config, **material)
-    pool = simulation.pool
     places = simulation.frame()["position"].astype(float)
     first, second = (int(np.argmin(np.linalg.norm(places - p, axis=1))) for p in ([3.5, 3.5, 3.5], [4.5, 3.5, 3.5]))
-    moved = places.copy()
-    moved[second, 0] = moved[first, 0] + gap
-    pool.position.assign(np.pad(moved, ((0, pool.size - len(moved)), (0, 0))).astype(np.float32))
-    pool.stale = True
-    dt = 1e-4
-    simulation.kick(np.stack([0 * moved[:, 0], moved[:, 2] % SIDE, 0 * moved[:, 0]], axis=1))
-    simulation.march(dt, 1)
-    shift = simulation.solver.shift.numpy()[[first, second], 0].astype(float) / (4.0 * dt * 1.5**2)
+    places[second, 0] = places[first, 0] + gap
+    shift = sheared(simulation, places)[[first, second], 0] / (4.0 * 1e-4 * 1.5**2)
+    if material is LIQUID:
+        shift /= PARTED
     if not moves:
         assert np.abs(shift).max() <= (0.02 if material is PASTE else 0.0)
     else:
@@ -165,6 +171,25 @@ def test_only_near_partners_crowd_each_other(material, gap, moves):
     if gap == 0.5:  # what else is near adds little
         left = crowding(0.6, 1.0, 1.5) if material is ELASTIC else 0.0
         assert shift[1] - shift[0] == pytest.approx(2.0 * (crowding(0.5, 1.0, 1.5) - left), rel=0.35)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_a_liquid_is_shifted_by_moves_it_nowhere(seed):
+    simulation = block(**LIQUID)
+    places = simulation.frame()["position"].astype(float)
+    shift = sheared(simulation, places + np.random.default_rng(seed).uniform(-0.3, 0.3, places.shape))
+    assert np.abs(shift).max() > 1e-4
+    assert np.abs(shift.sum(axis=0)).max() < 1e-5 * np.abs(shift).sum()
+
+
+@pytest.mark.parametrize(("material", "moves"), [(LIQUID, False), (PASTE, True)])
+def test_walls_crowd_no_liquid(material, moves):
+    """Its lowest row 0.25 spacings from a floor, so half a spacing from its image."""
+    simulation = block(walls=PERIODIC | {"z_lower": "slip", "z_upper": "slip"}, **material)
+    places = simulation.frame()["position"].astype(float)
+    places[:, 2] -= 0.25
+    upwards = sheared(simulation, places)[places[:, 2] < 1.0, 2]
+    assert np.all(upwards > 0.0) if moves else np.all(upwards == 0.0)
 
 
 def test_crowding_by_one_partner_by_hand():
