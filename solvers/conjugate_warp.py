@@ -12,7 +12,7 @@ from fluidbench.native.vector_access import in_company, joined, joined_in_block,
 
 wp.set_module_options({"enable_backward": False})  # no fast math: what is no number must end the iterations
 
-CHUNK = wp.constant(8)  # particles whose sums are added up first: results are the same on any number of threads
+CHUNK = wp.constant(32)  # particles whose sums are added up first, a warp: the same on any number of threads
 TEAM = BLOCK  # threads of a GPU that add up a world's chunks: all of a block
 AHEAD = wp.constant(8)  # sums that each of them asks for at once: one by one it would wait for memory every time
 
