@@ -49,7 +49,7 @@ def rooms(moved, walls="periodic", heavier=1.0):
     for name in ("clear_grid", "p2g", "grid_step"):
         getattr(solver, name)()
     rows = solver.moving.numpy()
-    with np.errstate(over="ignore"):  # of nodes that are not in use, which hold anything
+    with np.errstate(over="ignore", invalid="ignore"):  # of nodes that are not in use, which hold anything
         rows[::2, 3] *= heavier  # along z nodes follow each other
     solver.moving.assign(rows)
     found = wp.zeros(pool.size, dtype=wp.vec2)
