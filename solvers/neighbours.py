@@ -1,4 +1,4 @@
-"""Neighbour lists for SPH and PBD: kept until something has moved half a skin.
+"""Neighbour lists for SPH and PBD: kept until something has moved half a skin (search.py).
 
 On the CPU eight particles that are side by side in memory share a list, on a GPU each has its own: see pairs.py, which
 reads them. A list holds all that is within reach of any of its particles: first what lies inside, they themselves too,
@@ -40,11 +40,13 @@ def crowded(expansion: Expansion) -> str | None:
 
 
 class Neighbours:
-    """Lists of all pairs within `radius`, valid while nothing has moved more than half of `skin` (both [m])."""
+    """Lists of all pairs within `radius`, and of what may come there before they are made anew: as far as `skin` says,
+    (least, most), all [m]."""
 
-    def __init__(self, scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> None:
+    def __init__(self, scene: Scene, pool: Pool, backend: Backend, radius: float, skin: tuple[float, float]) -> None:
         self.scene, self.pool, self.backend = scene, pool, backend
-        self.reach, self.half_skin2 = radius + skin, (0.5 * skin) ** 2
+        self.radius, (self.thinnest, self.widest) = radius, skin
+        self.reach = self.radius + self.widest
         self.group = LANES if scene.device.is_cpu and backend.name == "warp" else 1
         self.groups = pool.size // self.group
         expansion = scene.scenario.material.expansion
@@ -56,6 +58,7 @@ class Neighbours:
             self.inside = wp.zeros(self.groups, dtype=int)
             self.listed = wp.zeros(pool.size, dtype=wp.vec3)
             self.outdated = wp.ones(1, dtype=int)
+            self.skin = wp.array([[self.widest, 0.0]], dtype=wp.vec2)
         lists = self.lists = search.Lists()
         lists.entries, lists.number, lists.inside, lists.group = self.entries, self.number, self.inside, self.group
         lists.threads = (
@@ -91,13 +94,15 @@ class Neighbours:
         self.backend.launch(
             search.watch,
             pool.size,
-            [pool.capacity, pool.count, pool.position, self.listed, self.half_skin2],
-            [self.outdated],
+            [pool.capacity, pool.count, pool.position, self.listed, self.radius, self.thinnest],
+            [self.skin, self.outdated],
         )
         wp.capture_if(self.outdated, on_true=self._renew)
 
     def _renew(self) -> None:
         pool = self.pool
+        limits = [self.radius, self.thinnest, self.widest]
+        self.scene.crew.launch(search.fit_skin, 1, [*limits, self.outdated], [self.skin])
         self.who.tell(self.backend)
         on_cpu = self.scene.device.is_cpu
         self.backend.launch(
@@ -107,7 +112,8 @@ class Neighbours:
                 self.scene.box,
                 pool.capacity,
                 pool.count,
-                self.reach,
+                self.radius,
+                self.skin,
                 self.limit,
                 self.who.cells,
                 pool.position,
@@ -118,7 +124,7 @@ class Neighbours:
 
     def carried(self) -> dict[str, wp.array]:
         """The lists as they are: made anew, they would be summed over in another order."""
-        return {name: getattr(self, name) for name in ("entries", "number", "inside", "listed", "outdated")}
+        return {name: getattr(self, name) for name in ("entries", "number", "inside", "listed", "outdated", "skin")}
 
     def traffic(self, rows: Sequence[int]) -> dict[str, float]:
         """Bytes of passes that ask these many floats of each neighbour: lists are streamed, rows come from caches."""
@@ -136,7 +142,7 @@ class Neighbours:
         return self.who.footprint()
 
 
-def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> Neighbours:
+def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, skin: tuple[float, float]) -> Neighbours:
     """Lists found by a backend's own search."""
     if backend.name == "taichi":
         from .neighbours_taichi import TaichiNeighbours

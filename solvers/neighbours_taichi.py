@@ -264,7 +264,8 @@ def fill_lists(
 
 
 class TaichiNeighbours(Neighbours):
-    """The same lists, found by Taichi; the kernels themselves look whether they are outdated."""
+    """Lists of the same pairs, found by Taichi, with the widest skin; the kernels themselves look whether they are
+    outdated."""
 
     def _allocate_cells(self) -> None:
         size, device = self.pool.size, self.scene.device
@@ -279,9 +280,8 @@ class TaichiNeighbours(Neighbours):
     def update(self) -> None:
         pool = self.pool
         cells = [self.key, self.start, self.filled, self.members]
-        self.backend.launch(
-            watch, pool.size, [pool.capacity, pool.count, pool.position, self.listed, self.half_skin2], [self.outdated]
-        )
+        watched = [pool.capacity, pool.count, pool.position, self.listed, (0.5 * self.widest) ** 2]
+        self.backend.launch(watch, pool.size, watched, [self.outdated])
         self.backend.launch(
             build, pool.size, [pool.capacity, self.reach, pool.count, pool.position, self.outdated], cells
         )

@@ -1,4 +1,10 @@
-"""The search for neighbours in Warp: when lists are outdated, and how they are filled."""
+"""The search for neighbours in Warp: when lists are outdated, how far they reach, and how they are filled.
+
+Lists reach a skin s beyond the support R, and hold while nothing has moved half of it. A wide skin costs every substep,
+by (1 + s / R)^3, a narrow one more renewals, of which each costs as much as `RENEWAL` substeps, one in s / (2 u) where
+the fastest moves by u a substep: together least at s^2 = 2 RENEWAL R u / 3 (nearly, for s << R). u is half the last
+skin over the substeps that it held.
+"""
 
 import warp as wp
 
@@ -13,6 +19,8 @@ wp.set_module_options({"enable_backward": False})
 FAULT_NEIGHBOURS = 4
 TEAM = wp.constant(8)  # threads that look for the neighbours of a particle on a GPU
 FAR = wp.constant(1.0e9)  # beyond any support [m]
+RENEWAL = wp.constant(2.0)
+OUTGROWN = wp.constant(2)  # what `outdated` says where it is not that something came or went: 1
 
 
 @wp.struct
@@ -36,6 +44,12 @@ def place_of(lists: Lists, g: int, k: int):
     return g * lists.row + step * lists.column + k - step * lists.threads
 
 
+@wp.func
+def best_skin(last: float, held: float, radius: float):
+    """The skin [m] that costs least, where the last one has held for so many substeps or more."""
+    return wp.sqrt(RENEWAL * radius * last / (3.0 * wp.max(held, 1.0)))
+
+
 @wp.kernel
 def watch(
     share: wp.vec3i,
@@ -43,15 +57,38 @@ def watch(
     count: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
     listed: wp.array(dtype=wp.vec3),
-    limit2: float,
+    radius: float,
+    thinnest: float,
     # outputs
+    skin: wp.array(dtype=wp.vec2),
     outdated: wp.array(dtype=int),
 ):
-    """Mark the lists outdated once a particle has moved half the skin since they were made."""
+    """Mark the lists outdated once a particle has moved half the skin since they were made, or half the skin would do.
+    `skin` is its width [m] and the substeps that it has held."""
     i = index_of(share, wp.tid())
+    last = skin[0][0]
+    half = 0.5 * last
+    outgrown = bool(False)
     if i % capacity < count[i / capacity]:
-        if wp.length_sq(position[i] - listed[i]) > limit2:
-            outdated[0] = 1
+        outgrown = wp.length_sq(position[i] - listed[i]) > half * half
+    if i == 0:
+        held = skin[0][1] + 1.0
+        outgrown = outgrown or (last > thinnest and best_skin(last, held, radius) < half)
+        skin[0] = wp.vec2(last, held)
+    if outgrown and outdated[0] == 0:
+        outdated[0] = OUTGROWN
+
+
+@wp.kernel
+def fit_skin(
+    radius: float, thinnest: float, widest: float, outdated: wp.array(dtype=int), skin: wp.array(dtype=wp.vec2)
+):
+    """The skin of the next lists; where the last one was not outgrown it was wide enough."""
+    last = skin[0][0]
+    best = best_skin(last, skin[0][1], radius)
+    if outdated[0] != OUTGROWN:
+        best = wp.min(best, last)
+    skin[0] = wp.vec2(wp.clamp(best, thinnest, widest), 0.0)
 
 
 @wp.func
@@ -96,7 +133,8 @@ def fill_lists(
     box: Box,
     capacity: int,
     count: wp.array(dtype=int),
-    reach: float,
+    radius: float,
+    skin: wp.array(dtype=wp.vec2),
     limit: int,
     cells: Cells,
     position: wp.array(dtype=wp.vec3),
@@ -115,6 +153,7 @@ def fill_lists(
     begin = g * lists.group
     world = begin / capacity
     end = wp.min(begin + lists.group, world * capacity + count[world])
+    reach = radius + skin[0][0]
     reach2 = reach * reach
     n = int(0)
     shifts, mirrors = wp.vec3i(4, 4, 4), wp.vec3i(4, 4, 4)
@@ -193,7 +232,8 @@ def fill_in_teams(
     box: Box,
     capacity: int,
     count: wp.array(dtype=int),
-    reach: float,
+    radius: float,
+    skin: wp.array(dtype=wp.vec2),
     limit: int,
     cells: Cells,
     position: wp.array(dtype=wp.vec3),
@@ -214,6 +254,7 @@ def fill_in_teams(
     if active and member == 0:
         listed[i] = x
     n = int(0)
+    reach = radius + skin[0][0]
     reach2 = reach * reach
     shifts = near_faces(box, x, reach, True)
     mirrors = near_faces(box, x, reach, False)

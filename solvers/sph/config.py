@@ -44,7 +44,7 @@ class ConfigSPH(Config):
     density_tolerance: NonNegative = Field(
         0.06, description="gap between the two that is left alone where they settle, over what disorder feigns"
     )
-    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="reach of the lists beyond the support, over h")
+    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.25, description="how far lists may reach beyond 2 h, over h")
 
     def alpha(self, material: Material) -> float:
         if material.relaxation_time is not None:

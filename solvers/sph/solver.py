@@ -43,6 +43,7 @@ from .strain_warp import MATTER, Straining
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 SPRAYED = 3.0  # particles across what is fed below which a paste that lands is sprayed: seen at 2.4, not at 3.4
 BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
+THINNEST = 0.04  # reach of the lists beyond the support, over h, however still matter lies
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
 FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 
@@ -166,7 +167,8 @@ class SolverSPH(Solver):
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
             self.told = wp.zeros(pool.size * TOLD // 4 if self.settles else 1, dtype=wp.vec4)
-        self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
+        skin = min(THINNEST, config.skin) * self.num.h, config.skin * self.num.h
+        self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, skin)
         self.tool = (
             None if scene.outline is None else tool_of(scene, 2.0 * self.num.h, weights(self.num.h, self.implicit))
         )

@@ -101,7 +101,8 @@ def listed(sim):
 def test_lists_hold_all_that_is_in_reach_and_sums_are_theirs(walls, number, worlds, device):
     sim = cloud(walls, number, device, worlds)
     solver = sim.solver
-    reach, support, volume = solver.neighbours.reach, solver.num.support, sim.scene.spacing**3
+    reach = solver.neighbours.radius + float(solver.neighbours.skin.numpy()[0, 0])
+    support, volume = solver.num.support, sim.scene.spacing**3
     expected, held = near(sim, (1.0 - 1e-6) * reach), listed(sim)
     assert not [i for i in expected if not expected[i].keys() <= held[i]]
     widest = near(sim, (1.0 + 1e-6) * reach)

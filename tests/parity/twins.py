@@ -19,7 +19,8 @@ TOLERANCE = 2e-5  # float32; sums may be taken in another order
 GRID = ("raw", "moving")
 BY_CHANCE = ("table", "block_of")  # in the order in which threads come, on a GPU
 GARBAGE = 1.0e6  # in slots that nobody may touch
-OWN_LISTS = ("neighbours.entries", "neighbours.number", "neighbours.inside")  # each language goes through its own
+# Each language has its own lists, and makes them when it needs them.
+OWN_LISTS = tuple(f"neighbours.{name}" for name in ("entries", "number", "inside", "listed", "skin"))
 PARTS = (("neighbours.", "neighbours"), ("", "around"), ("", "elastic"))  # of a solver that hold arrays
 # Rows that neighbours are asked for: which of their floats are one quantity, and judged by its size.
 PLACE, VELOCITY = [(0, 3), (3, 4)], (4, 7)
@@ -255,7 +256,7 @@ class Twins:
             yield f"neighbours differ for {len(wrong)} particles, such as {wrong[0]} by {odd}"
 
     def _in_reach(self, sim: Simulation) -> dict[int, set[int]]:
-        """The entries that each particle finds, itself left out, well within its reach."""
+        """The entries that each particle finds, itself left out, within its kernel."""
         neighbours, pool, box = sim.solver.neighbours, sim.pool, sim.scene.box
         lists = neighbours.lists
         entries, number = neighbours.entries.numpy(), neighbours.number.numpy()
@@ -273,6 +274,6 @@ class Twins:
                     mirrored = [2.0 * low - x[:, axis], 2.0 * high - x[:, axis]]
                     shifted = [x[:, axis] - (high - low), x[:, axis] + (high - low)]
                     x[:, axis] = np.choose(which, [x[:, axis], *(shifted if periodic else mirrored)])
-                near = np.linalg.norm(x - position[i], axis=1) < (1.0 - 1e-5) * neighbours.reach
+                near = np.linalg.norm(x - position[i], axis=1) < (1.0 - 1e-5) * neighbours.radius
                 found[i] = set(listed[near & (listed != i)].tolist())
         return found
