@@ -41,20 +41,13 @@ def measure(particles: int, device: str, steps: int, warmup: int) -> dict[str, o
     """Steps a second, and particle-substeps per wall and CPU second, of the replayed graph alone."""
     simulation = Simulation(block(particles), "mpm", Target(device))
     simulation.prepare()
-    simulation.solver.refresh()
-    simulation.scene.set_dt(DT)
-    if (keys := simulation.solver.sort_keys()) is not None:
-        simulation.reorder(keys)
-        simulation.solver.refresh()
-    with wp.ScopedCapture(device=device) as capture:
-        for _ in range(SUBSTEPS):
-            simulation.solver.substep()
+    simulation.begin()
     for _ in range(warmup):
-        wp.capture_launch(capture.graph)
+        simulation.march(DT, SUBSTEPS)  # records it
     wp.synchronize_device(device)
     wall, cpu = time.perf_counter(), time.process_time()
     for _ in range(steps):
-        wp.capture_launch(capture.graph)
+        simulation.march(DT, SUBSTEPS)
     wp.synchronize_device(device)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     n = simulation.pool.counts[0]
