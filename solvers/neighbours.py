@@ -26,6 +26,7 @@ LANES = 8  # particles that share a list on the CPU: as many floats as its vecto
 FEWEST, MOST = 4, 32  # threads that share a particle on a GPU
 BUSY = 2**18  # threads that keep a large GPU busy
 WORTHWHILE = 11  # entries that a thread goes through at least
+THINNEST = 0.02  # how far lists reach beyond the support, over it, however still matter lies
 
 
 def crowded(expansion: Expansion) -> str | None:
@@ -40,12 +41,12 @@ def crowded(expansion: Expansion) -> str | None:
 
 
 class Neighbours:
-    """Lists of all pairs within `radius`, and of what may come there before they are made anew: as far as `skin` says,
-    (least, most), all [m]."""
+    """Lists of all pairs within `radius`, and of what may come there before they are made anew: up to `skin` beyond,
+    both [m]."""
 
-    def __init__(self, scene: Scene, pool: Pool, backend: Backend, radius: float, skin: tuple[float, float]) -> None:
+    def __init__(self, scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> None:
         self.scene, self.pool, self.backend = scene, pool, backend
-        self.radius, (self.thinnest, self.widest) = radius, skin
+        self.radius, self.thinnest, self.widest = radius, min(THINNEST * radius, skin), skin
         self.reach = self.radius + self.widest
         self.group = LANES if scene.device.is_cpu and backend.name == "warp" else 1
         self.groups = pool.size // self.group
@@ -142,7 +143,7 @@ class Neighbours:
         return self.who.footprint()
 
 
-def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, skin: tuple[float, float]) -> Neighbours:
+def neighbours_of(scene: Scene, pool: Pool, backend: Backend, radius: float, skin: float) -> Neighbours:
     """Lists found by a backend's own search."""
     if backend.name == "taichi":
         from .neighbours_taichi import TaichiNeighbours

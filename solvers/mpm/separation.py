@@ -25,7 +25,7 @@ from ..backends import Warp
 from ..bind import warp_func
 from ..cells import Cells, WhoIsWhere, bucket_of, cell_of, place
 from ..corrected import enclosed, least_eigenvalue
-from ..crowding import CLOSE, excess, nearest, out_of_crowd
+from ..crowding import CLOSE, FARTHEST, excess, nearest, out_of_crowd
 from ..flow import flows, shear_rate
 from ..images import face_kind, has_choice, image_position, near_faces, undoing
 from ..pairs import floats
@@ -145,7 +145,7 @@ def separate(
                     sums[6], sums[9], sums[10], sums[9], sums[7], sums[11], sums[10], sums[11], sums[8]
                 )  # fmt: skip
                 crowd += enclosed(least_eigenvalue(moment)) * wp.vec3(sums[3], sums[4], sums[5])
-            by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]))
+            by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]), FARTHEST)
             found = wp.vec4(by[0], by[1], by[2], 1.0)
         shift[i] = found
 

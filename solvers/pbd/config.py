@@ -20,7 +20,7 @@ class ConfigPBD(Config):
     hourglass: Annotated[float, Field(ge=0, le=1)] = Field(
         1.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows; 0 in what expands"
     )
-    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="reach of the lists beyond H, over spacing")
+    skin: Annotated[float, Field(gt=0, le=1)] = Field(0.3, description="how far lists may reach beyond H, over spacing")
 
     def zeta(self, material: Material) -> float:
         """Of the hourglass control. It remembers where neighbours were: in what expands, children have others."""

@@ -126,8 +126,8 @@ class SolverPBD(Solver):
             self.fill = wp.ones(pool.size, dtype=float)
             self.places = wp.zeros(pool.size * PLACE // 4, dtype=wp.vec4)
             self.pushes = wp.zeros(pool.size * push_row(self.drawn) // 4, dtype=wp.vec4)
-        skin = config.skin * scene.spacing  # never thinner: within a substep corrections move what is listed
-        self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, (skin, skin))
+        skin = config.skin * scene.spacing
+        self.neighbours = neighbours_of(scene, pool, self.backend, self.num.support, skin)
         self.constraining = Constraining()
         self.constraining.dt, self.constraining.phases = scene.dt, scene.phases
         self.constraining.phase_of = pool.phase

@@ -5,7 +5,7 @@ from typing import Any
 from fluidbench.native.scene import FRICTION
 
 from ..corrected_taichi import mirrored_stress
-from ..neighbours_taichi import BoxT, ListsT, face_kind, image_gradient, image_traction, image_velocity
+from ..neighbours_taichi import BoxT, ListsT, face_kind, image_traction, image_velocity
 from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, vector_at, vector_into
 from ..taichi_bridge import Floats, Forces, Ints, Phases, Quads, Vectors, force_at, phase_at, ti, vec3, vec4
 from .force_warp import width_of
@@ -35,7 +35,7 @@ def rubbed(box, x, v, inward_pull, walls, h):
 def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> Any:
     """The kernel, see force_warp.py."""
     width = width_of(strength, tensile, changing)
-    last, many, state_at = width - 4, 6 if tensile else 9, reader(width)
+    last, state_at = width - 4, reader(width)
 
     @ti.func
     def state_seen(box, extra: ti.template(), row, j, code):
@@ -44,8 +44,6 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
             out = matrix_into(out, 7, mirrored_stress(box, stressed(row, 7), code))
         if ti.static(strength):
             out = vector_into(out, 16, image_traction(box, vector_at(row, 16), code))
-        if ti.static(not tensile):
-            out = vector_into(out, 8, image_gradient(box, vector_at(row, 8), code))
         return out
 
     @ti.func
@@ -53,7 +51,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
         u = vector_at(own, 4) - vector_at(other, 4)
         r2, ur, tiny = r.norm_sqr(), u.dot(r), 0.01 * num.h * num.h
         q = ti.sqrt(r2) / num.h
-        shock, drag, share = begun[0], begun[1], begun[2]
+        shock, drag = begun[0], begun[1]
         mine, theirs = 1.0, 1.0
         if ti.static(changing):
             mine, theirs = 1.0 / other[last + 1], 1.0 / own[last + 1]
@@ -62,7 +60,6 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
             shock = num.artificial_viscosity * num.h * fast / ti.max(own[last], other[last])
             thin = 2.0 * own[last + 2] * other[last + 2] / ti.max(own[last + 2] + other[last + 2], 1.0e-30)
             drag = 10.0 * num.viscous_lattice * thin / (own[last + 1] * other[last + 1])
-            share = 2.0 * num.evened / (own[last + 1] + other[last + 1])
         along = 0.0  # what acts along the line of centres
         push = vec3(0.0)
         if ti.static(tensile):
@@ -77,10 +74,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
         if ti.static(viscous):
             along += drag * ur / (r2 + 0.01 * tiny)
         f = other[3] * slope(q, num.h)
-        sums = vector_into(ti.Vector.zero(ti.f32, many), 0, f * (push + along * r))
-        if ti.static(not tensile):
-            sums = vector_into(sums, 6, -share * f * (vector_at(own, 8) - vector_at(other, 8)))
-        return sums
+        return vector_into(ti.Vector.zero(ti.f32, 6), 0, f * (push + along * r))
 
     @ti.func
     def rough_apart(box, code, sums):
@@ -92,7 +86,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
                 out[axis] = 0.0
         return out
 
-    pushed_by = over_pairs(width, many, force_pair, state_seen, rough_apart)
+    pushed_by = over_pairs(width, 6, force_pair, state_seen, rough_apart)
 
     @ti.kernel
     def force(
@@ -111,7 +105,6 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
         forces: Forces,
         density: Floats,
         acceleration: Vectors,
-        shift: Vectors,
     ):
         for i in range(phase_of.shape[0]):
             world = i // capacity
@@ -121,12 +114,10 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
                 # Pi_ij per velocity difference: alpha h c / rho (Monaghan 1992), and 2 (d + 2) mu / (rho_i rho_j)
                 shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
                 drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
-                begun = vec4(shock, drag, num.evened / phase.density, 0.0)
+                begun = vec4(shock, drag, 0.0, 0.0)
                 sums = pushed_by(num, box, lists, entries, number, state, density, i, own, begun)
                 a = vector_at(sums, 0) + force_at(forces, world, vector_at(own, 0))
                 rub = rubbed(box, vector_at(own, 0), vector_at(own, 4), a, vector_at(sums, 3), dt[world])
                 acceleration[i] = a + rub
-                if ti.static(not tensile):
-                    shift[i] = vector_at(sums, 6)
 
     return force

@@ -5,7 +5,7 @@ import warp as wp
 from fluidbench.native.scene import Box, Force, Phase, force_at
 
 from ..corrected import mirrored_stress
-from ..images import image_gradient, image_traction, image_velocity, rough_faces
+from ..images import image_traction, image_velocity, rough_faces
 from ..pairs import Pass, floats
 from ..tool import Tool, felt
 from .particle import Smoothing, slope
@@ -14,10 +14,10 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 
 def width_of(strength: bool, tensile: bool, changing: bool) -> int:
-    """Floats of a row of `force`: position, mass | velocity, then the pressure term | shift out of crowds; of what
-    carries tension instead of these two its stress (9), of what has strength also the traction that pulls back (3) and
+    """Floats of a row of `force`: position, mass | velocity, then the pressure term; of what carries tension instead
+    of that its stress (9), of what has strength also the traction that pulls back (3) and
     how far it is a straggler. Where partners differ also density, rest density, viscosity, sound."""
-    return (20 if strength else 16 if tensile else 12) + (4 if changing else 0)
+    return (20 if strength else 16 if tensile else 8) + (4 if changing else 0)
 
 
 @wp.struct
@@ -30,18 +30,15 @@ class Forcing:
     forces: wp.array(dtype=Force)
     new_density: wp.array(dtype=float)
     acceleration: wp.array(dtype=wp.vec3)
-    shift: wp.array(dtype=wp.vec3)
     tool: Tool
 
 
 def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, tooled: bool) -> Pass:
     """Momentum: pressure or stress, artificial and Newtonian viscosity. Sums: what pushes (3), and what pushes across
-    friction walls (3), which never pull and rub by Coulomb's law; of what cavitates also how it is shifted beside its
-    neighbours (3): what they share would move a free surface, unseen by density."""
+    friction walls (3), which never pull and rub by Coulomb's law."""
     N = width = width_of(strength, tensile, changing)
     LAST = width - 4
-    sums_of = 6 if tensile else 9
-    Own, Other, Sums = floats(width + 4), floats(width), floats(sums_of)
+    Own, Other, Sums = floats(width + 4), floats(width), floats(6)
 
     @wp.func
     def begin(num: Smoothing, data: Forcing, world: int, i: int):
@@ -51,7 +48,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
         # break the bound on dt. Monaghan 1992: alpha h c / rho; Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
         shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
         drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
-        return wp.vec4(shock, drag, num.evened / phase.density, 0.0)
+        return wp.vec4(shock, drag, 0.0, 0.0)
 
     @wp.func
     def seen(box: Box, data: Forcing, row: Other, j: int, code: int):
@@ -68,10 +65,6 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
             g = image_traction(box, wp.vec3(row[16], row[17], row[18]), code)
             for axis in range(3):
                 row[16 + axis] = g[axis]
-        if wp.static(not tensile):
-            shift = image_gradient(box, wp.vec3(row[8], row[9], row[10]), code)
-            for axis in range(3):
-                row[8 + axis] = shift[axis]
         return row
 
     @wp.func
@@ -82,7 +75,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
         f = other[3] * slope(q, num.h)
         ur = wp.dot(u, r)
         tiny = 0.01 * num.h * num.h
-        shock, drag, share = float(own[N]), float(own[N + 1]), float(own[N + 2])
+        shock, drag = float(own[N]), float(own[N + 1])
         mine, theirs = float(1.0), float(1.0)
         if wp.static(changing):
             # Stress over rho_i^2 rho0_j / rho0_i: light matter must not feel its heavy partner's mass, and the strain's
@@ -93,7 +86,6 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
             shock = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(own[LAST], other[LAST])
             thin = 2.0 * own[LAST + 2] * other[LAST + 2] / wp.max(own[LAST + 2] + other[LAST + 2], 1.0e-30)
             drag = 10.0 * num.viscous_lattice * thin / (own[LAST + 1] * other[LAST + 1])
-            share = 2.0 * num.evened / (own[LAST + 1] + other[LAST + 1])
         along = float(0.0)
         push = wp.vec3(0.0, 0.0, 0.0)
         if wp.static(tensile):
@@ -125,8 +117,6 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
         sums = Sums()
         for a in range(3):
             sums[a] = push[a]
-            if wp.static(not tensile):
-                sums[6 + a] = -share * f * (own[8 + a] - other[8 + a])
         return sums
 
     @wp.func
@@ -186,7 +176,5 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
         if wp.static(tooled):
             a += by_tool(num, data, world, i, own, a + pull)
         data.acceleration[i] = a + pull
-        if wp.static(not tensile):
-            data.shift[i] = wp.vec3(sums[6], sums[7], sums[8])
 
-    return Pass(Smoothing, Forcing, width, sums_of, pair, finish, begin, seen, rough_faces, across)
+    return Pass(Smoothing, Forcing, width, 6, pair, finish, begin, seen, rough_faces, across)

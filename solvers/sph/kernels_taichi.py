@@ -26,7 +26,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_taichi import force_pass
-from .settling_taichi import settle, tell
+from .settling_taichi import settle_pass, tell_pass
 from .strain_taichi import strain_pass
 
 
@@ -35,7 +35,7 @@ def passes(strength: bool, tensile: bool, viscous: bool, changing: bool, settlin
     """All passes, for materials with or without shear stiffness, tension, viscosity, parameters or rest densities that
     differ between particles, and anything that settles."""
     strain, force = strain_pass(strength, tensile, changing), force_pass(strength, tensile, viscous, changing)
-    more = {"tell": tell, "settle": settle} if settling else {}
+    more = {"tell": tell_pass(tensile), "settle": settle_pass(tensile)} if settling else {}
     return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **more)
 
 
@@ -95,7 +95,7 @@ def move(
             if tensile == 0:
                 carried_gradient[i] = carried
             free = position[i] + h * v
-            if held[i] == FREE:
+            if held[i] == FREE and tensile == 1:
                 free += shift[i]
             if too_fast(v, box.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)

@@ -41,8 +41,8 @@ def passes(
     force = force_pass(strength, tensile, viscous, changing, tooled).compiled(f"force_{name}", cpu)
     more = {"keep_out": keep_out} if tooled else {}
     if settling:
-        more["tell"] = tell_pass(tooled).compiled("tell" + "_tooled" * tooled, cpu)
-        more["settle"] = settle_pass().compiled("settle", cpu)
+        more["tell"] = tell_pass(tensile, tooled).compiled("tell" + "_tensile" * tensile + "_tooled" * tooled, cpu)
+        more["settle"] = settle_pass(tensile).compiled("settle" + "_tensile" * tensile, cpu)
     return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **more)
 
 
@@ -115,7 +115,7 @@ def move(
         if tensile == 0:
             carried_gradient[i] = carried
         free = position[i] + h * v
-        if held[i] == FREE:
+        if held[i] == FREE and tensile == 1:
             free += shift[i]
         if too_fast(v, box.top_speed):
             raise_fault(fault, FAULT_ASTRAY)

@@ -20,7 +20,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 LEVELLED = wp.constant(32.0)
 # By how much more what cavitates is shifted, which keeps of it what neighbours do not share. Pairs of a lattice that is
 # pressed together come to 0.54 d by 4 times as much, to 0.66 by 8, to 0.72 by 12 and 0.73 by 16; all else stays.
-PARTED = 12.0
+PARTED = wp.constant(12.0)
 
 slope = warp_func(wendland_slope)
 
@@ -42,6 +42,8 @@ class Smoothing:
     evened: float  # d^2 over what a lattice sums to of -V W'/r: makes means of sums of it [m^2]
     density_feedback: float  # rate at which integrated density follows a crowd's, in c / h [-]
     density_tolerance: float  # gap between the two that is left alone where they settle, over `disorder` [-]
+    spacing: float  # [m]
+    farthest: float  # of h^2 crowding that what cavitates is shifted by at a time [-]
     settling: float  # `shifting` times the time from tick to tick [s]
     disorder: float  # by how much particles in no order lean, see settling.py [-]
 

@@ -1,12 +1,18 @@
 """What SPH's passes in Taichi share: particle.py, written anew."""
 
 from ..aging import DISORDER
-from ..smoothing import wendland_slope
+from ..smoothing import wendland, wendland_slope
 from ..taichi_bridge import struct_of, taichi_func, ti
 from .particle import Smoothing
 
-slope = taichi_func(wendland_slope)
+slope, kernel = taichi_func(wendland_slope), taichi_func(wendland)
 SmoothingT = struct_of(Smoothing)
+
+
+@ti.func
+def excess(num, r):
+    """By what a partner at r crowds: see ../crowding.py."""
+    return ti.max((kernel(r.norm() / num.h, num.h) / num.near) ** 4 - 1.0, 0.0)
 
 
 @ti.func

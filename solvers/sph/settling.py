@@ -22,7 +22,6 @@ SURFACE = 0.56  # flat surfaces 0.53 to 0.565 at any depth, sheets of 3 h and mo
 MOST = 0.62  # sheets of 2 h 0.60 to 0.64, cylinders of 3.3 and 2.2 h 0.56 to 0.63
 LENGTHENED = 0.31  # mean of sqrt(max(r^2 - 1, 0)), r a length with Maxwell's distribution and a mean square of 1
 AVERAGED = 0.37  # of what disorder makes places lean by, what is left in the mean over neighbours
-TOLD = 8  # floats: position, V0; phi, l
 
 
 def disorder(ratio: float) -> float:

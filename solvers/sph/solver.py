@@ -20,7 +20,7 @@ from .. import aging
 from ..backends import LACKING, backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
-from ..crowding import crowding, nearest
+from ..crowding import crowding, farthest, nearest
 from ..flow import plastic_strains
 from ..lattice import lattice_moments, opposing, sloping, viscous_scale
 from ..neighbours import crowded, neighbours_of, side_by_side
@@ -35,15 +35,14 @@ from . import kernels_warp as kernels
 from .bounds import bounds_of
 from .config import ConfigSPH
 from .force_warp import Forcing, width_of
-from .particle import PARTED, Smoothing
-from .settling import TOLD, disorder
-from .settling_warp import Settling
+from .particle import Smoothing
+from .settling import disorder
+from .settling_warp import Settling, told_of
 from .strain_warp import MATTER, Straining
 
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 SPRAYED = 3.0  # particles across what is fed below which a paste that lands is sprayed: seen at 2.4, not at 3.4
 BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
-THINNEST = 0.04  # reach of the lists beyond the support, over h, however still matter lies
 FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
 FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 
@@ -145,7 +144,8 @@ class SolverSPH(Solver):
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.compact = (scene.spacing / opposing(ratio)) ** 2
         self.num.hourglass = config.hourglass
-        self.num.shifting = config.shifting * (1.0 if scene.tensile else PARTED)
+        self.num.shifting = config.shifting
+        self.num.spacing, self.num.farthest = scene.spacing, farthest(scene.spacing, self.num.h)
         self.num.evened = scene.spacing**2 / float(sloping(ratio)[1].sum())
         self.num.density_feedback = config.density_feedback
         self.num.density_tolerance, self.num.disorder = config.density_tolerance, disorder(ratio)
@@ -164,11 +164,10 @@ class SolverSPH(Solver):
             self.matter = wp.zeros(pool.size * MATTER // 4, dtype=wp.vec4)
             self.state = wp.zeros(pool.size * self.width // 4, dtype=wp.vec4)
             self.new_density = wp.zeros(pool.size, dtype=float)
-            self.shift = wp.zeros(pool.size, dtype=wp.vec3)
+            self.shift = wp.zeros(pool.size if scene.tensile else 1, dtype=wp.vec3)
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
-            self.told = wp.zeros(pool.size * TOLD // 4 if self.settles else 1, dtype=wp.vec4)
-        skin = min(THINNEST, config.skin) * self.num.h, config.skin * self.num.h
-        self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, skin)
+            self.told = wp.zeros(pool.size * told_of(scene.tensile) // 4 if self.settles else 1, dtype=wp.vec4)
+        self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
         self.tool = (
             None if scene.outline is None else tool_of(scene, 2.0 * self.num.h, weights(self.num.h, self.implicit))
         )
@@ -197,7 +196,8 @@ class SolverSPH(Solver):
         pool, scene = self.pool, self.scene
         self.straining, self.forcing, self.telling = Straining(), Forcing(), Settling()
         for data in (self.straining, self.forcing):
-            data.dt, data.new_density, data.shift = scene.dt, self.new_density, self.shift
+            data.dt, data.new_density = scene.dt, self.new_density
+        self.straining.shift = self.shift
         for data in (self.straining, self.forcing, self.telling):
             data.phases, data.phase_of = scene.phases, pool.phase
             if self.tool is not None:
@@ -211,6 +211,7 @@ class SolverSPH(Solver):
             setattr(self.straining, name, array)
         self.telling.held, self.telling.mass, self.telling.density = pool.held, pool.mass, pool.density
         self.telling.told, self.telling.flowing = self.told, pool.flowing
+        self.telling.position = pool.position
         self.forcing.forces, self.forcing.acceleration = scene.force, self.acceleration
 
     def _strains(self) -> list[wp.array]:
@@ -283,6 +284,7 @@ class SolverSPH(Solver):
         self.pack()
         self._over_pairs(self.kernels.tell, self.matter, self.telling)
         self._over_pairs(self.kernels.settle, self.told, self.telling)
+        self._keep_out()
 
     def force(self) -> None:
         self._over_pairs(self.kernels.force, self.state, self.forcing)
@@ -315,7 +317,11 @@ class SolverSPH(Solver):
             ],
             [pool.position, pool.velocity, pool.density, pool.carried_gradient, pool.fault],
         )
+        self._keep_out()
 
+    def _keep_out(self) -> None:
+        """Of the rigid body."""
+        pool = self.pool
         if self.tool is not None:
             inputs = [self.tool, pool.capacity, pool.count, pool.held]
             self.backend.launch(self.kernels.keep_out, pool.size, inputs, [pool.position])

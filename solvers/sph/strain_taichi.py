@@ -4,7 +4,6 @@ from typing import Any
 
 from fluidbench.method.frame import CARRIED
 from fluidbench.native.pool import FAULT_STATE
-from fluidbench.native.scene import PERIODIC
 
 from ..aging import GROWN
 from ..corrected import EDGE, INSIDE, LEANING, SOUND
@@ -19,7 +18,7 @@ from ..corrected_taichi import (
 from ..crowding import FARTHEST
 from ..flow_taichi import pressure, shear_rate, strained
 from ..hourglass_taichi import off_linear_after
-from ..neighbours_taichi import BoxT, ListsT, face_kind, image_gradient, image_velocity
+from ..neighbours_taichi import BoxT, ListsT, image_gradient, image_velocity
 from ..pairs_taichi import (
     matrix_into,
     over_pairs,
@@ -30,7 +29,6 @@ from ..pairs_taichi import (
     vector_into,
     writer,
 )
-from ..smoothing import wendland
 from ..taichi_bridge import (
     Floats,
     Ints,
@@ -41,17 +39,15 @@ from ..taichi_bridge import (
     is_solid,
     mat3,
     phase_at,
-    taichi_func,
     ti,
     vec3,
     vec4,
 )
 from .force_warp import width_of
 from .particle import LEVELLED
-from .particle_taichi import SmoothingT, crowded, damped, slope
+from .particle_taichi import SmoothingT, crowded, excess, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
-kernel = taichi_func(wendland)
 matter_at = reader(MATTER)
 
 
@@ -65,7 +61,7 @@ def matter_seen(box, extra: ti.template(), row, j, code):
 def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
     """The kernel, see strain_warp.py."""
     width = width_of(strength, tensile, changing)
-    last, many = width - 4, 28 if strength else 22 if tensile else 14
+    last, many = width - 4, 28 if strength else 22 if tensile else 3
     write_state = writer(width)
 
     @ti.func
@@ -77,31 +73,20 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
             w, partner, partner_gradient = w * relative, partner * relative, partner_gradient * relative
         sums = ti.Vector.zero(ti.f32, many)
         sums[0] = w * (own[7] - partner - (vector_at(own, 8) + partner_gradient).dot(r))
-        near = (kernel(r.norm() / num.h, num.h) / num.near) ** 4
-        sums = vector_into(sums, 1, ti.max(near - 1.0, 0.0) * w * r)
         if ti.static(strength):
             sums = vector_into(vector_into(sums, 22, w * u), 25, w * r)
-        sums = matrix_into(sums, 4, -w * u.outer_product(r))
         if ti.static(tensile):
+            sums = matrix_into(sums, 1, -w * u.outer_product(r))
             square = -w * r.outer_product(r)
-            sums = vector_into(sums, 13, vec3(square[0, 0], square[1, 1], square[2, 2]))
-            sums = vector_into(sums, 16, vec3(square[0, 1], square[0, 2], square[1, 2]))
-            sums = vector_into(sums, 19, (partner - own[7]) * w * r)
+            sums = vector_into(sums, 10, vec3(square[0, 0], square[1, 1], square[2, 2]))
+            sums = vector_into(sums, 13, vec3(square[0, 1], square[0, 2], square[1, 2]))
+            sums = vector_into(sums, 16, (partner - own[7]) * w * r)
+            sums = vector_into(sums, 19, excess(num, r) * w * r)
         else:
-            sums[13] = -w * r.norm_sqr()
+            sums[1], sums[2] = w * u.dot(r), -w * r.norm_sqr()
         return sums
 
-    @ti.func
-    def uncrowded(box, code, sums):
-        """Walls crowd no liquid that cavitates."""
-        out = sums
-        if ti.static(not tensile):
-            for axis in ti.static(range(3)):
-                if face_kind(box, code, axis) != PERIODIC:
-                    out = vector_into(out, 1, vec3(0.0))
-        return out
-
-    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen, uncrowded)
+    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen)
 
     @ti.kernel
     def strain(
@@ -142,13 +127,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 grown = rest < GROWN * phase.density
                 sums = strained_by(num, box, lists, entries, number, matter, held, i, own, vec4(0.0))
                 spread, first_moment = sums[0], vec3(0.0)
-                second, alone, least, flows, h = sums[13], 0.0, 0.0, True, dt[world]
+                second, alone, least, flows, h = sums[2], 0.0, 0.0, True, dt[world]
                 deformation, correction, span = mat3(0.0), mat3(0.0), mat3(0.0)
                 b, s, z, off = vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)
-                gradient = stressed(sums, 4) / rho
-                approach = -rho * gradient.trace()
+                gradient, approach, sheared = mat3(0.0), sums[1], 0.0
                 if ti.static(tensile):
-                    moment = symmetric_at(sums, 13)
+                    gradient = stressed(sums, 1) / rho
+                    moment = symmetric_at(sums, 10)
                     second = moment.trace()
                     correction = symmetric_inverse(moment / rho)
                     gradient = gradient @ correction
@@ -157,8 +142,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                     gradient = span @ gradient
                     approach = -rho * deformation.trace()
                     least = least_eigenvalue(moment / rho)
-                    carried_gradient[i] = 0.5 / rho * (correction @ vector_at(sums, 19))
-                sheared = shear_rate(gradient)
+                    carried_gradient[i] = 0.5 / rho * (correction @ vector_at(sums, 16))
+                    sheared = shear_rate(gradient)
                 if ti.static(strength):
                     b, s, z = elastic_normal[i], elastic_shear[i], off_linear[i]
                     first_moment = vector_at(sums, 25)
@@ -175,7 +160,9 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                         flows = kept < 1.0 or phase.shear_modulus <= 0.0
                         z = off_linear_after(z, gradient, off, kept, h)
                         elastic_normal[i], elastic_shear[i], off_linear[i] = b, s, z
-                inflow, crowd = approach, vector_at(sums, 1) / rho
+                inflow, crowd = approach, vec3(0.0)
+                if ti.static(tensile):
+                    crowd = vector_at(sums, 19) / rho
                 flows = flows and not is_solid(phase)
                 if flows:
                     if ti.static(strength):
@@ -188,12 +175,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                             stirred += growth[i]
                         rate = ti.min(rate, LEVELLED * stirred)
                     inflow += 2.0 * num.h * num.h * rate * spread / rho
-                else:
+                elif ti.static(tensile):
                     crowd *= ti.max(1.0 - num.broken / ti.max(crowd.norm(), 1.0e-12), 0.0)
                 if flows or grown:
                     inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
-                flowing[i] = damped(num, phase, rho, sheared) if flows and held[i] != CARRIED else 0.0
-                shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
+                if ti.static(tensile):
+                    flowing[i] = sheared if flows and held[i] != CARRIED else 0.0
+                    shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
                 rho += h * inflow
                 if rho <= -rest or beyond(rho, CRUSHED * rest):
                     ti.atomic_or(fault[0], FAULT_STATE)
@@ -221,7 +209,6 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                     row = matrix_into(row, 7, scale * (span @ cauchy @ correction))
                 else:
                     row[7] = scale * p
-                    row = vector_into(row, 8, shift[i])
                 if ti.static(changing):
                     row = vector_into(row, last, vec3(rho, rest, phase.viscosity))
                     row[last + 3] = sound

@@ -1,5 +1,7 @@
 """The first sum over neighbours of SPH: continuity, velocity gradient, strain and stress."""
 
+from typing import Any
+
 import warp as wp
 
 from fluidbench.method.frame import CARRIED
@@ -19,14 +21,14 @@ from ..corrected import (
     strain_by_chords,
     symmetric_inverse,
 )
-from ..crowding import excess, out_of_crowd
+from ..crowding import FARTHEST, excess, out_of_crowd
 from ..flow import pressure, shear_rate, strained
 from ..hourglass import off_linear
-from ..images import image_gradient, image_velocity, mirroring_faces
+from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
-from .particle import LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
+from .particle import LEVELLED, Smoothing, broken, crowded, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -60,7 +62,7 @@ class Straining:
 
 
 @wp.func
-def seen_matter(box: Box, data: Straining, row: floats(MATTER), j: int, code: int):
+def seen_matter(box: Box, data: Any, row: floats(MATTER), j: int, code: int):
     """A row of `strain` in the walls."""
     v = image_velocity(box, wp.vec3(row[4], row[5], row[6]), code)
     g = image_gradient(box, wp.vec3(row[8], row[9], row[10]), code)
@@ -76,18 +78,14 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners: of what
     cavitates by its acceleration (see `move`), of what carries tension, whose shear stress carries as well, half the
     corrected gradient of density itself (Antuono et al. 2010), and it levels no faster than `LEVELLED` times the shear
-    and the growth that make its noise. Sums: diffusion, crowding (3), the velocity gradient (9), the second moment (its
-    trace; of what carries tension xx yy zz xy xz yz, and the gradient of density (3)), of what has strength also the
-    motion off the mean of the neighbours (3) and the first moment (3).
-
-    What shears is told by the gradient alone, a liquid's uncorrected, which a free surface halves. All relative motion,
-    noise included, made noise feed on itself: rows on a slip wall were held up by shifting as fast as they fell.
-    Walls crowd no liquid that cavitates, for the same reason.
+    and the growth that make its noise. Sums: diffusion; of what cavitates the inflow and the second moment's trace; of
+    what carries tension the velocity gradient (9), the second moment (xx yy zz xy xz yz), the gradient of density (3)
+    and crowding (3), of what has strength also the motion off the mean of the neighbours (3) and the first moment (3).
 
     A plain sum takes it for expansion when a particle comes to the surface, out of a bore: tension pulled the skin of
     strands together by a fifth. A liquid that cavitates feels none, and needs no correction.
     """
-    sums_of = 28 if strength else 22 if tensile else 14
+    sums_of = 28 if strength else 22 if tensile else 3
     state_of = width_of(strength, tensile, changing) // 4
     Own, Other, Sums = floats(MATTER + 4), floats(MATTER), floats(sums_of)
 
@@ -106,36 +104,28 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             carried *= share
         spread = w * (own[7] - partner - wp.dot(wp.vec3(own[8], own[9], own[10]) + carried, r))
         m = w * r
-        crowd = excess(wp.sqrt(r2), num.h, num.near) * m
         sums = Sums()
         sums[0] = spread
-        for a in range(3):
-            sums[1 + a] = crowd[a]
-        for a in range(3):
-            for b in range(3):
-                sums[4 + 3 * a + b] = -u[a] * m[b]
         if wp.static(tensile):
+            crowd = excess(wp.sqrt(r2), num.h, num.near) * m
             for a in range(3):
-                sums[13 + a] = -m[a] * r[a]
-            sums[16] = -m[0] * r[1]
-            sums[17] = -m[0] * r[2]
-            sums[18] = -m[1] * r[2]
+                for b in range(3):
+                    sums[1 + 3 * a + b] = -u[a] * m[b]
             for a in range(3):
-                sums[19 + a] = (partner - own[7]) * m[a]
+                sums[10 + a] = -m[a] * r[a]
+            sums[13] = -m[0] * r[1]
+            sums[14] = -m[0] * r[2]
+            sums[15] = -m[1] * r[2]
+            for a in range(3):
+                sums[16 + a] = (partner - own[7]) * m[a]
+                sums[19 + a] = crowd[a]
         else:
-            sums[13] = -w * r2
+            sums[1] = wp.dot(u, m)
+            sums[2] = -w * r2
         if wp.static(strength):
             for a in range(3):
                 sums[22 + a] = w * u[a]
                 sums[25 + a] = m[a]
-        return sums
-
-    @wp.func
-    def across(walls: wp.vec3, sums: Sums):
-        if wp.static(not tensile):
-            crowds = 1.0 - wp.max(walls)
-            for a in range(3):
-                sums[1 + a] = crowds * sums[1 + a]
         return sums
 
     @wp.func
@@ -145,17 +135,18 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if found.on == 1:
             rho = own[7]
             u = rho * seen_by_tool(tool, found, wp.vec3(own[4], own[5], own[6]))
-            for a in range(3):
-                for b in range(3):
-                    sums[4 + 3 * a + b] -= u[a] * found.own[b]
             if wp.static(tensile):
                 for a in range(3):
-                    sums[13 + a] -= rho * found.second[a, a]
-                sums[16] -= rho * found.second[0, 1]
-                sums[17] -= rho * found.second[0, 2]
-                sums[18] -= rho * found.second[1, 2]
+                    for b in range(3):
+                        sums[1 + 3 * a + b] -= u[a] * found.own[b]
+                for a in range(3):
+                    sums[10 + a] -= rho * found.second[a, a]
+                sums[13] -= rho * found.second[0, 1]
+                sums[14] -= rho * found.second[0, 2]
+                sums[15] -= rho * found.second[1, 2]
             else:
-                sums[13] -= rho * wp.trace(found.second)
+                sums[1] += wp.dot(u, found.own)
+                sums[2] -= rho * wp.trace(found.second)
             if wp.static(strength):
                 for a in range(3):
                     sums[22 + a] += u[a] * found.zeroth
@@ -175,29 +166,27 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if wp.static(tooled):
             sums = into_tool(data.tool, own, sums)
         spread = sums[0]
-        crowd = wp.vec3(sums[1], sums[2], sums[3])
-        second, least, alone = float(sums[13]), float(0.0), float(0.0)
+        second, inflow, sheared = float(sums[2]), float(sums[1]), float(0.0)
+        least, alone = float(0.0), float(0.0)
         flows = bool(True)
-        deformation, correction, span = wp.mat33(), wp.mat33(), wp.mat33()
-        gradient = wp.mat33(
-            sums[4], sums[5], sums[6], sums[7], sums[8], sums[9], sums[10], sums[11], sums[12]
-        ) / rho  # fmt: skip
-        inflow = -rho * wp.trace(gradient)
+        deformation, correction, span, gradient = wp.mat33(), wp.mat33(), wp.mat33(), wp.mat33()
         if wp.static(tensile):
             # density from the corrected gradient, too: the same strain for pressure and for shear
             moment = wp.mat33(
-                sums[13], sums[16], sums[17], sums[16], sums[14], sums[18], sums[17], sums[18], sums[15]
+                sums[10], sums[13], sums[14], sums[13], sums[11], sums[15], sums[14], sums[15], sums[12]
             )  # fmt: skip
             second = wp.trace(moment)
             correction = symmetric_inverse(moment / rho)
-            gradient = gradient * correction
+            gradient = wp.mat33(
+                sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8], sums[9]
+            ) / rho * correction  # fmt: skip
             span = spanned(moment / rho, correction)
             deformation = strain_by_chords(span, gradient, h)
             gradient = span * gradient
             inflow = -rho * wp.trace(deformation)
-            data.carried_gradient[i] = (0.5 / rho) * (correction * wp.vec3(sums[19], sums[20], sums[21]))
+            data.carried_gradient[i] = (0.5 / rho) * (correction * wp.vec3(sums[16], sums[17], sums[18]))
             least = least_eigenvalue(moment / rho)
-        sheared = shear_rate(gradient)
+            sheared = shear_rate(gradient)
         if wp.static(strength):
             first_moment = wp.vec3(sums[25], sums[26], sums[27])
             b = data.elastic_normal[i]
@@ -218,15 +207,16 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
                 data.elastic_shear[i] = s
                 data.off_linear[i] = z
         flows = flows and not is_solid(phase)
-        if wp.static(strength):
-            if flows:
-                crowd += enclosed(least) * first_moment
-        crowd /= rho
-        if not flows:
-            crowd = broken(crowd, num.broken)
-        data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, damped(num, phase, rho, sheared), 0.0)
-        shift = out_of_crowd(crowd, num.h, num.shifting * h * sheared)
-        data.shift[i] = shift
+        if wp.static(tensile):
+            data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, sheared, 0.0)
+            crowd = wp.vec3(sums[19], sums[20], sums[21])
+            if wp.static(strength):
+                if flows:
+                    crowd += enclosed(least) * first_moment
+            crowd /= rho
+            if not flows:
+                crowd = broken(crowd, num.broken)
+            data.shift[i] = out_of_crowd(crowd, num.h, num.shifting * h * sheared, FARTHEST)
         if flows or grown:
             # Where fresh foam rises against cured foam neither flows, and they came to lie within each other with no
             # pressure to say so.
@@ -272,10 +262,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             store_vec4(data.state, at + 3, wp.vec4(t[1, 2], t[2, 0], t[2, 1], t[2, 2]))
         else:
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], scale * p))
-            store_vec4(data.state, at + 2, wp.vec4(shift[0], shift[1], shift[2], 0.0))
         if wp.static(changing):
             store_vec4(data.state, at + state_of - 1, wp.vec4(rho, rest, phase.viscosity, sound))
 
-    return Pass(
-        Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter, faces=mirroring_faces, across=across
-    )
+    return Pass(Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter)

@@ -29,10 +29,11 @@ ROWS = {
     "places": PLACE,
     "moving": [*PLACE, VELOCITY, (7, 8)],
     "pulling": [*PLACE, (4, 13), (13, 16)],
-    "told": [*PLACE, (4, 5), (5, 8)],
 }
 PUSHES = [*PLACE, (4, 7), (7, 8)]
+TOLD = [*PLACE, (4, 5), (5, 8)]
 BY_WIDTH = {
+    "told": {8: TOLD, 12: [*TOLD, (8, 11)]},
     "pushes": {12: [*PUSHES, (8, 9)], 16: [*PUSHES, (8, 14), (14, 15), (15, 16)]},
     "state": {
         16: [*PLACE, VELOCITY, (7, 16)],
@@ -41,8 +42,8 @@ BY_WIDTH = {
     },
 }
 CAVITATING = {  # what carries no tension
-    12: [*PLACE, VELOCITY, (7, 8), (8, 11)],
-    16: [*PLACE, VELOCITY, (7, 8), (8, 11), *((k, k + 1) for k in range(12, 16))],
+    8: [*PLACE, VELOCITY, (7, 8)],
+    12: [*PLACE, VELOCITY, (7, 8), *((k, k + 1) for k in range(8, 12))],
 }
 
 

@@ -7,23 +7,23 @@ import pytest
 
 from fluidbench.method.target import Target
 from fluidbench.native.simulation import Simulation
+from solvers.neighbours import THINNEST
 from solvers.search import RENEWAL, best_skin
-from solvers.sph.solver import THINNEST
 
 from ..conftest import PERIODIC, scenario
 
 SPACING = 0.01
 
 
-def drifting(step, substeps):
-    """SPH's solver of a periodic lattice that has moved by `step` [m] in each of so many substeps."""
+def drifting(method, step, substeps):
+    """The solver of a periodic lattice that has moved by `step` [m] in each of so many substeps."""
     lattice = scenario(
         domain={"lower": [0.0] * 3, "upper": [0.08] * 3, "walls": PERIODIC},
         bodies=[{"kind": "box", "center": [0.04] * 3, "size": [0.08] * 3}],
         gravity=[0, 0, 0],
         spacing=SPACING,
     )
-    sim, dt = Simulation(lattice, "sph", Target()), 1e-5
+    sim, dt = Simulation(lattice, method, Target()), 1e-5
     sim.prepare()
     sim.begin()
     sim.kick(np.full((sim.pool.counts[0], 3), [step / dt, 0.0, 0.0]))
@@ -45,18 +45,20 @@ def test_the_best_skin_costs_least(share):
     assert cost(best, radius, step) < 1.01 * least
 
 
+@pytest.mark.parametrize("method", ["sph", "pbd"])
 @pytest.mark.parametrize("share", [0.002, 0.006])
-def test_what_moves_steadily_has_lists_as_wide_as_costs_least(share):
+def test_what_moves_steadily_has_lists_as_wide_as_costs_least(method, share):
     """Steps over the support. The skin that a step asks for does not depend on the one before."""
-    neighbours = drifting(0.0, 1).neighbours
+    neighbours = drifting(method, 0.0, 1).neighbours
     radius = neighbours.radius
-    skin = float(drifting(share * radius, 300).neighbours.skin.numpy()[0, 0])
+    skin = float(drifting(method, share * radius, 300).neighbours.skin.numpy()[0, 0])
     assert skin == pytest.approx(math.sqrt(2.0 * float(RENEWAL) * share / 3.0) * radius, rel=0.15)
     assert neighbours.thinnest < skin < neighbours.widest
 
 
-def test_what_rests_has_the_thinnest_lists_and_what_rushes_the_widest():
-    still, fast = drifting(0.0, 400).neighbours, drifting(0.3 * SPACING, 30).neighbours
-    assert still.skin.numpy()[0, 0] == pytest.approx(0.5 * THINNEST * still.radius)
+@pytest.mark.parametrize("method", ["sph", "pbd"])
+def test_what_rests_has_the_thinnest_lists_and_what_rushes_the_widest(method):
+    still, fast = drifting(method, 0.0, 400).neighbours, drifting(method, 0.3 * SPACING, 30).neighbours
+    assert still.skin.numpy()[0, 0] == pytest.approx(THINNEST * still.radius)
     assert fast.skin.numpy()[0, 0] == pytest.approx(fast.widest)
     assert still.number.numpy().sum() < 0.9 * fast.number.numpy().sum()
