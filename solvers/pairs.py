@@ -26,8 +26,8 @@ from .neighbours import LANES
 from .search import FAR, Lists
 
 OWN = 4  # further floats that a particle brings to its pairs, which no neighbour is asked for
-HEAVY, BLOCKS = 20, 5  # passes of so many floats are held to registers that let so many blocks share a multiprocessor
-ROWS_AHEAD = 24  # floats of neighbours' rows that a thread of a GPU has on their way at once
+HEAVY, BLOCKS = 20, 6  # passes of so many floats are held to registers that let so many blocks share a multiprocessor
+ROWS_AHEAD = 24  # floats of neighbours' rows that a thread of a GPU has on their way at once, of two rows at least
 ahead = wp.types.vector(length=4, dtype=int)
 
 
@@ -198,7 +198,7 @@ def _in_teams(p: Pass) -> Callable:
     read, begin, seen, pair, finish = _reader(N), p.begin, p.seen, p.pair, p.finish
     faces, across = p.faces, p.across
 
-    STEPS = min(max(ROWS_AHEAD // N, 1), 4)
+    STEPS = min(max(ROWS_AHEAD // N, 2), 4)
     Others = wp.types.matrix(shape=(STEPS, N), dtype=float)
 
     @wp.func

@@ -86,8 +86,9 @@ def tell_pass(tensile: bool) -> Any:
                 if ti.static(not tensile):
                     phase = phase_at(phases, i // capacity, phase_of[i])
                     stirred = held[i] != CARRIED and not is_solid(phase)
-                    flowing[i] = shear_rate(stressed(sums, 7)) if stirred else 0.0
-                    strain = ti.min(PARTED * num.settling * flowing[i], num.farthest)
+                    sheared = shear_rate(stressed(sums, 7)) if stirred else 0.0
+                    flowing[i] = damped(num, phase, own[7], sheared)
+                    strain = ti.min(PARTED * num.settling * sheared, num.farthest)
                     row = vector_into(row, 8, -strain * num.h * num.h * vector_at(sums, 4))
                 write(told, i, row)
 
@@ -162,7 +163,6 @@ def settle_pass(tensile: bool) -> Any:
                     off = drift(filled - rho / rest, lean, sums[5] / sums[0], num.density_tolerance * num.disorder)
                     if phase.relaxation_rate > 0.0:
                         off = ti.max(off, ti.min(1.0 - rho / rest, 0.0))
-                    rate = ti.min(num.settling * damped(num, phase, rho, flowing[i]), 1.0)
-                    density[i] = rho + rest * heard(filled) * rate * off
+                    density[i] = rho + rest * heard(filled) * ti.min(num.settling * flowing[i], 1.0) * off
 
     return settle

@@ -104,12 +104,13 @@ def tell_pass(tensile: bool, tooled: bool) -> Pass:
             gradient = wp.mat33(
                 sums[7], sums[8], sums[9], sums[10], sums[11], sums[12], sums[13], sums[14], sums[15]
             )  # fmt: skip
-            flowing = float(0.0)
-            if data.held[i] != CARRIED and not is_solid(data.phases[world, data.phase_of[i]]):
-                flowing = shear_rate(gradient)
-            data.flowing[i] = flowing
+            phase = data.phases[world, data.phase_of[i]]
+            sheared = float(0.0)
+            if data.held[i] != CARRIED and not is_solid(phase):
+                sheared = shear_rate(gradient)
+            data.flowing[i] = damped(num, phase, own[7], sheared)
             crowd = wp.vec3(sums[4], sums[5], sums[6])
-            shift = out_of_crowd(crowd, num.h, PARTED * num.settling * flowing, num.farthest)
+            shift = out_of_crowd(crowd, num.h, PARTED * num.settling * sheared, num.farthest)
             store_vec4(data.told, quads * i + 2, wp.vec4(shift[0], shift[1], shift[2], 0.0))
 
     return Pass(
@@ -172,8 +173,7 @@ def settle_pass(tensile: bool) -> Pass:
             if phase.relaxation_rate > 0.0:
                 # in a stretched thread a pair too close reads as thin, and would be pulled closer
                 off = wp.max(off, wp.min(1.0 - rho / rest, 0.0))
-            rate = damped(num, phase, rho, data.flowing[i])
-            data.density[i] = rho + rest * heard(filled) * wp.min(num.settling * rate, 1.0) * off
+            data.density[i] = rho + rest * heard(filled) * wp.min(num.settling * data.flowing[i], 1.0) * off
         if wp.static(not tensile):
             if data.held[i] == FREE:
                 free = wp.vec3(own[0] + sums[6], own[1] + sums[7], own[2] + sums[8])

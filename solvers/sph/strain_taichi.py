@@ -45,7 +45,7 @@ from ..taichi_bridge import (
 )
 from .force_warp import width_of
 from .particle import LEVELLED
-from .particle_taichi import SmoothingT, crowded, excess, slope
+from .particle_taichi import SmoothingT, crowded, damped, excess, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
 matter_at = reader(MATTER)
@@ -180,7 +180,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 if flows or grown:
                     inflow += num.density_feedback * sound / num.h * crowded(num, rho, second)
                 if ti.static(tensile):
-                    flowing[i] = sheared if flows and held[i] != CARRIED else 0.0
+                    flowing[i] = damped(num, phase, rho, sheared) if flows and held[i] != CARRIED else 0.0
                     shift[i] = -ti.min(num.shifting * h * sheared, FARTHEST) * num.h * num.h * crowd
                 rho += h * inflow
                 if rho <= -rest or beyond(rho, CRUSHED * rest):

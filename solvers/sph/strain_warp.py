@@ -28,7 +28,7 @@ from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
-from .particle import LEVELLED, Smoothing, broken, crowded, pulled_back, slope, straggling
+from .particle import LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -208,7 +208,7 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
                 data.off_linear[i] = z
         flows = flows and not is_solid(phase)
         if wp.static(tensile):
-            data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, sheared, 0.0)
+            data.flowing[i] = wp.where(flows and data.held[i] != CARRIED, damped(num, phase, rho, sheared), 0.0)
             crowd = wp.vec3(sums[19], sums[20], sums[21])
             if wp.static(strength):
                 if flows:

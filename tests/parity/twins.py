@@ -74,6 +74,8 @@ class Twins:
         targets = [Target(device, backend, threads) for backend in BACKENDS]
         self.warp, self.taichi = (Simulation(worlds, method, target, graphs=False) for target in targets)
         self.method = method
+        if method != "mpm":  # Taichi's lists are as wide as may be
+            self.warp.solver.neighbours.thinnest = self.warp.solver.neighbours.widest
         for sim in (self.warp, self.taichi):
             sim.prepare()
         for _ in range(ticks):
