@@ -19,7 +19,8 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 # changes; at 4 sections of strands were 2 % too large; without a limit pastes crept on for as long as anyone looked.
 LEVELLED = wp.constant(32.0)
 # By how much more what cavitates is shifted, which keeps of it what neighbours do not share. Pairs of a lattice that is
-# pressed together come to 0.54 d by 4 times as much, to 0.66 by 8, to 0.72 by 12 and 0.73 by 16; all else stays.
+# pressed together come to 0.54 d by 4 times as much, to 0.66 by 8, to 0.72 by 12 and 0.73 by 16, in every substep; all
+# else stays. Between ticks most of it is beyond what a pair can be moved by at once (`farthest`), and it is 0.62.
 PARTED = wp.constant(12.0)
 
 slope = warp_func(wendland_slope)

@@ -5,10 +5,11 @@ crowded. Every tick, where matter flows,
 
     rho += min(shifting |2 dev D| dt, 1) heard `drift` rho0
 
-with the rate of shear of the tick's last substep (a liquid's no more than nu / h^2: see particle.py). A sum over V0
-that is exact in a lattice, lattice / 3 sum_j V0_j r.grad W, tells by what share phi each place is filled, and h sum_j
-V0_j grad W how far it leans, l: to a free surface. Both are averaged over neighbours, by V0 W: a place alone is off by
-2 or 3 % in disorder. Averaged so, a surface lacks `SURFACE` to `MOST` times the mean of |l|, at any depth.
+with the rate of shear of the tick's last substep (a liquid's no more than nu / h^2: see particle.py). What cavitates is
+also shifted out of crowds then, by how it shears at that moment: a substep needs to know neither. A sum over V0 that
+is exact in a lattice, lattice / 3 sum_j V0_j r.grad W, tells by what share phi each place is filled, and h sum_j V0_j
+grad W how far it leans, l: to a free surface. Both are averaged over neighbours, by V0 W: a place alone is off by 2 or
+3 % in disorder. Averaged so, a surface lacks `SURFACE` to `MOST` times the mean of |l|, at any depth.
 
 Tried: a place's own phi and l. Noise in |l| was rectified: matter swelled by 3 to 10 % where a gap within the tolerance
 of either sign was taken off, and skins were drawn together by 2 to 5 % where only what leans little was heard. The mean
