@@ -31,6 +31,7 @@ from .bounds import bounds_of
 from .by_block import ByBlock
 from .clamp import Clamps
 from .config import ConfigMPM
+from .gaps import Gaps
 from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, grid_of
 from .implicit import GridViscosity
 from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
@@ -148,6 +149,9 @@ class SolverMPM(Solver):
         settles = config.shifting > 0.0 and self.held is None and scene.flows
         rate = TURNS * EVERY * config.shifting
         self.settling = Settling(scene, pool, self.grid, self.strains[-1], rate) if settles else None
+        meets = any(scenario.emits or len(scenario.bodies) > 1 for scenario in scene.scenarios)
+        told = not (implicit or scene.expands or self.held)  # whose push is whose, and by its mass how full a node is
+        self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes) if meets and told else None
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
@@ -172,6 +176,8 @@ class SolverMPM(Solver):
         )
         if self.by_block is not None:
             self.by_block.refresh()
+        if self.gaps is not None:
+            self.gaps.refresh()
         if not self.started:
             self._start_affine()
 
@@ -296,10 +302,15 @@ class SolverMPM(Solver):
         if self.held is not None:
             self.empty(self.held.nodes)
             self.held.level(self.table, self.piston, self.moving)
+        homes = None if self.by_block is None else self.by_block.homes
+        blocks = self.table, self.block_of, self.active
+        if self.gaps is not None:
+            self.gaps.look(*blocks, self.raw, self.moving, self.piston)
         self.gather()
+        if self.gaps is not None:
+            self.gaps.go_on(*blocks, homes)
         if self.held is not None:
-            homes = None if self.by_block is None else self.by_block.homes
-            self.held.keep_out(self.table, self.block_of, self.active, homes)
+            self.held.keep_out(*blocks, homes)
 
     def gather(self) -> None:
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
@@ -340,7 +351,7 @@ class SolverMPM(Solver):
         if self.scene.changes:
             self.scene.crew.load(aging)
         self.order.prepare()
-        for part in (self.clamps, self.separation, self.settling):
+        for part in (self.clamps, self.separation, self.settling, self.gaps):
             if part is not None:
                 part.prepare()
         self.backend.prepare(self)
@@ -387,4 +398,5 @@ class SolverMPM(Solver):
         more = {} if self.by_block is None else self.by_block.footprint()
         more |= {} if self.held is None else self.held.footprint()
         more |= {} if self.separation is None else self.separation.footprint()
+        more |= {} if self.gaps is None else self.gaps.footprint()
         return {name: getattr(self, name).capacity for name in names} | more | footprint_of(self.viscosity)
