@@ -3,16 +3,12 @@ passes that are rare or small. (Momentum goes faster: patches.py, together.py.)"
 
 import warp as wp
 
-from fluidbench.native.vector_access import load_vec4
-
 from .grid import Grid, activate_stencil, first_node, node_at
 from .homes import on_grid
 from .particle import ANCHORED, PACKED, weights
 from .walls import in_front
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
-
-Places = wp.types.vector(length=27, dtype=wp.int32)
 
 
 @wp.func
@@ -23,19 +19,6 @@ def signs_of(node: wp.vec3i, inside: wp.vec3i):
         if inside[axis] != node[axis]:
             signs[axis] = -1.0
     return signs
-
-
-@wp.func
-def places_of(grid: Grid, world: int, base: wp.vec3i, table: wp.array(dtype=int)):
-    """Where the 27 nodes from `base` on, or those in front of walls for their images, lie in arrays of nodes; -1 where
-    no block is active. All first, and then what is done there: no load waits for what was written meanwhile."""
-    places = Places()
-    for o in range(3):
-        for q in range(3):
-            for r in range(3):
-                inside = in_front(grid, base + wp.vec3i(o, q, r))
-                places[9 * o + 3 * q + r] = node_at(grid, world, on_grid(grid, inside), table)
-    return places
 
 
 @wp.func
@@ -52,16 +35,16 @@ def tell_nodes(
     vector's component across is turned round."""
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
-    places = places_of(grid, world, base, table)
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                at = places[9 * o + 3 * q + r]
+                node = base + wp.vec3i(o, q, r)
+                inside = in_front(grid, node)
+                at = node_at(grid, world, on_grid(grid, inside), table)
                 if at >= 0:
                     told = row
                     if vector:
-                        node = base + wp.vec3i(o, q, r)
-                        signs = signs_of(node, in_front(grid, node))
+                        signs = signs_of(node, inside)
                         told = wp.vec4(signs[0] * row[0], signs[1] * row[1], signs[2] * row[2], row[3])
                     wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * told)
 
@@ -74,18 +57,17 @@ def mean_of_nodes(
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
     mean = wp.vec3(0.0, 0.0, 0.0)
-    places = places_of(grid, world, base, table)
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                at = places[9 * o + 3 * q + r]
-                told = load_vec4(nodes, wp.max(at, 0))
-                if at >= 0 and told[3] > 0.0:
-                    share = wx[o] * wy[q] * wz[r] / told[3]
-                    heard = wp.vec3(told[0], told[1], told[2])
+                node = base + wp.vec3i(o, q, r)
+                inside = in_front(grid, node)
+                at = node_at(grid, world, on_grid(grid, inside), table)
+                if at >= 0 and nodes[at][3] > 0.0:
+                    share = wx[o] * wy[q] * wz[r] / nodes[at][3]
+                    heard = wp.vec3(nodes[at][0], nodes[at][1], nodes[at][2])
                     if vector:
-                        node = base + wp.vec3i(o, q, r)
-                        heard = wp.cw_mul(signs_of(node, in_front(grid, node)), heard)
+                        heard = wp.cw_mul(signs_of(node, inside), heard)
                     mean += share * heard
     return mean
 

@@ -75,14 +75,10 @@ def through(
             signs[axis] = -1.0
     at = image_position(box, x, undoing(box, code))  # where it sees others as it sees their images from x
     middle = cell_of(at, cells.width)
-    for row in range(9):  # three cells at a time: what is in them is fetched side by side
-        b0 = bucket_of(cells, world, around(middle, 3 * row))
-        b1 = bucket_of(cells, world, around(middle, 3 * row + 1))
-        b2 = bucket_of(cells, world, around(middle, 3 * row + 2))
-        n0, n1, n2 = int(cells.number[b0]), int(cells.number[b1]), int(cells.number[b2])
-        s0, s1, s2 = int(cells.start[b0]), int(cells.start[b1]), int(cells.start[b2])
-        for k in range(n0 + n1 + n2):
-            m = wp.where(k < n0, s0 + k, wp.where(k < n0 + n1, s1 + k - n0, s2 + k - n0 - n1))
+    for c in range(27):
+        bucket = bucket_of(cells, world, around(middle, c))
+        start = cells.start[bucket]
+        for m in range(start, start + cells.number[bucket]):
             r = wp.cw_mul(signs, at - place(cells.spot[m]))
             length = wp.length(r)
             if length < cells.width and length > 0.0 and (code > 0 or cells.members[m] != i):
