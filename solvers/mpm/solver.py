@@ -1,115 +1,42 @@
 """The material point method: allocation and the order of passes."""
 
-import math
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import warp as wp
 
-from fluidbench.method.contract import Economy, NumericalAxis
-from fluidbench.method.features import Feature
-from fluidbench.method.target import BACKENDS
-from fluidbench.method.timestep import Bound
 from fluidbench.native.crew import put
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
-from fluidbench.native.solver import Solver
-from fluidbench.scenario import Scenario
 
 from .. import aging
-from ..backends import LACKING, backend_of
+from ..backends import backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..flow import plastic_strains
 from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
-from ..theory import mpm_numbers, stable_dt
-from ..viscosity import decided
 from . import kernels_warp as kernels
-from .bounds import bounds_of
 from .by_block import ByBlock
 from .clamp import Clamps
-from .config import ConfigMPM
 from .gaps import Gaps
-from .grid import FAULT_BLOCKS, MAX_BLOCKS, blocks_of, grid_of
+from .grid import grid_of
 from .implicit import GridViscosity
-from .particle import EXPLICIT, FAULT_STENCIL, IMPLICIT, PRESSED
+from .particle import EXPLICIT, IMPLICIT, PRESSED
 from .piston import piston_of
-from .pressed import roughly_pressed, unpressed
 from .separation import EVERY, Separation
 from .settling import TURNS, Settling
 from .tool import Held
+from .traits import TraitsMPM
 
 NODE: Any = wp.vec4  # momentum and mass of a grid node
-WORTH = 16.0  # times the substeps explicit viscosity may take before implicit is cheaper: docs/physics/viscosity.md
 
 
-class SolverMPM(Solver):
+class SolverMPM(TraitsMPM):
     """MLS-MPM with APIC transfers, quadratic B-splines, symplectic Euler, on a block-sparse grid."""
 
-    name = "mpm"
-    rank = 1
-    paradigm = "hybrid: particles carry state, a background grid carries momentum"
-    shares_threads = True
-    features = frozenset(Feature)
-    backends: ClassVar = tuple(BACKENDS)
-    lacking: ClassVar = LACKING
-    Config: ClassVar = ConfigMPM
     passes = ("clear_grid", "p2g", "grid_step", "g2p")
-    faults: ClassVar = {
-        FAULT_BLOCKS: "material spread over more grid blocks than allocated; raise numerics.mpm.blocks_per_particle",
-        FAULT_STENCIL: "a particle left the blocks of the grid within one step",
-    }
-
-    typical_rate, typical_bytes = 4.0e6, 4000.0
-    axes: ClassVar = (NumericalAxis("particles_per_cell", "grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-", 1 / 3),)
-
-    @classmethod
-    def weight_of_a_step(cls, scenario: Scenario, config: Any) -> float:
-        return WORTH if config.viscosity == "implicit" else 1.0
-
-    @classmethod
-    def decided(cls, scenario: Scenario, config: Any) -> Any:
-        only = scenario.domain.rubs or scenario.outline is not None
-        return decided(cls, scenario, config, math.inf if only else WORTH)
-
-    @classmethod
-    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
-        blocks = blocks_of(scenario.domain, config.grid_ratio * scenario.spacing)
-        if blocks > MAX_BLOCKS:
-            return f"the domain holds {blocks:.3g} grid blocks; use a smaller domain or a larger spacing"
-        if reason := unpressed(scenario, config):
-            return reason
-        if config.viscosity == "implicit" and scenario.domain.rubs:
-            return "its walls have friction, which implicit viscosity knows nothing of; use viscosity = 'explicit'"
-        return None
-
-    @classmethod
-    def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
-        return roughly_pressed(scenario, config)
-
-    @classmethod
-    def memory(cls, scenario: Scenario, config: Any, particles: int) -> float:
-        index = 4.0 * blocks_of(scenario.domain, config.grid_ratio * scenario.spacing)  # of every block, used or not
-        solve = 5.0 * 64.0 * 16.0 * config.blocks_per_particle * particles  # nodes of its five arrays
-        return super().memory(scenario, config, particles) + index + (solve if config.viscosity == "implicit" else 0.0)
-
-    @classmethod
-    def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
-        return [
-            Economy("coarser grid", {"grid_ratio": round(min(1.33 * config.grid_ratio, 4.0), 3)}),
-            Economy("larger dt", {"safety": 1.0}),
-            Economy("no shifting", {"shifting": 0.0, "separation": 0.0}),
-        ]
-
-    @classmethod
-    def theory(cls, scenario: Scenario, config: Any) -> float:
-        return stable_dt(cls, scenario, config, *mpm_numbers(config.safety))
-
-    @classmethod
-    def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        return bounds_of(scenario, config, speed)
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config

@@ -1,37 +1,29 @@
 """Position-based dynamics: allocation and the order of passes."""
 
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import warp as wp
 
-from fluidbench.method.contract import Economy
-from fluidbench.method.features import Feature
-from fluidbench.method.target import BACKENDS
-from fluidbench.method.timestep import Bound
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import FRICTION, Scene
-from fluidbench.native.solver import Solver
-from fluidbench.scenario import Scenario
 
 from .. import aging
-from ..backends import LACKING, backend_of
+from ..backends import backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
-from ..neighbours import crowded, neighbours_of, side_by_side
+from ..neighbours import neighbours_of, side_by_side
 from ..readout import present_density
-from ..search import FAULT_NEIGHBOURS
 from ..smoothing import cusp, spiky_slope
 from ..tool import table_of, tool_of
 from ..tool_map import Weights
 from ..viscosity import ImplicitViscosity, beside
 from . import kernels_warp as kernels
-from .bounds import bounds_of
-from .config import ConfigPBD
 from .constraints_warp import Constraining
 from .elasticity import Elasticity
 from .numbers import MOVING, PLACE, PULLING, SETTLED, numbers_of, push_row
 from .surroundings import Surroundings
+from .traits import TraitsPBD
 
 INSTANT = 1e-6  # s/m: in so little time, over a spacing, nothing falls, flows or is drawn together
 SETTLING_PLACED, SETTLING_BORN = 30, 10  # iterations; 30 after births change no volume by 1 %
@@ -42,20 +34,9 @@ def weights(support: float) -> Weights:
     return Weights(lambda r: spiky_slope(r, support) / r, **beside(support), level=lambda r: cusp(r, support))
 
 
-class SolverPBD(Solver):
+class SolverPBD(TraitsPBD):
     """Position-based fluids: density constraints, and the common law's stress and viscosity, implicit in time."""
 
-    name = "pbd"
-    rank = 3
-    paradigm = "particles projected onto constraints; velocity follows from the change of position"
-    shares_threads = makes_room = True
-    features = frozenset(Feature)
-    backends: ClassVar = tuple(BACKENDS)
-    lacking: ClassVar = LACKING
-    Config: ClassVar = ConfigPBD
-    faults: ClassVar = {
-        FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full",
-    }
     passes = (
         "predict",
         "lists",
@@ -71,43 +52,6 @@ class SolverPBD(Solver):
         "strain",
         "pull",
     )
-
-    typical_rate, typical_bytes = 1.5e5, 1300.0
-    bounded = False
-
-    @classmethod
-    def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
-        return [
-            Economy("fewer iterations", {"iterations": max(1, config.iterations // 2)}),
-            Economy("larger dt", {"advance": min(2.0 * config.advance, 1.0)}),
-            Economy("fewer neighbours", {"support_ratio": 2.0}),
-        ]
-
-    @classmethod
-    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
-        m = scenario.material
-        if m.expansion is not None and (reason := crowded(m.expansion)):
-            return reason
-        if m.is_solid and scenario.emits:
-            return (
-                f"a solid is fed in (it yields at {m.flow_threshold:.3g} Pa, and its shear modulus is "
-                f"{m.shear_modulus:.3g} Pa): pieces that break off are torn on by gradients of velocity; set a "
-                "material.yield_stress below the shear modulus"
-            )
-        return None
-
-    @classmethod
-    def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
-        m, words = scenario.material, []
-        if m.youngs_modulus is not None:
-            words.append("elastic waves are damped: backward Euler takes w dt / 2 of one of frequency w in a radian")
-        if (m.youngs_modulus is not None or m.viscosity > 0.0) and not m.is_solid:
-            words.append("isotropic tension is a density constraint's: it draws together what lies within matter")
-        return [*words, "pressure is whatever keeps rho <= rho0: no equation of state, no sound speed"]
-
-    @classmethod
-    def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        return bounds_of(scenario, config, speed)
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config

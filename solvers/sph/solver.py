@@ -7,44 +7,32 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from fluidbench.method.contract import Economy
-from fluidbench.method.features import Feature
-from fluidbench.method.target import BACKENDS
-from fluidbench.method.timestep import Bound
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
-from fluidbench.native.solver import Solver
-from fluidbench.scenario import Scenario
 
 from .. import aging
-from ..backends import LACKING, backend_of
+from ..backends import backend_of
 from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..crowding import crowding, farthest, nearest
 from ..flow import plastic_strains
 from ..lattice import lattice_moments, opposing, sloping, viscous_scale
-from ..neighbours import crowded, neighbours_of, side_by_side
+from ..neighbours import neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
-from ..search import FAULT_NEIGHBOURS
 from ..smoothing import wendland_slope
-from ..theory import sph_numbers, stable_dt
 from ..tool import table_of, tool_of
 from ..tool_map import Weights
-from ..viscosity import WORTH, ImplicitViscosity, beside, decided
+from ..viscosity import ImplicitViscosity, beside
 from . import kernels_warp as kernels
-from .bounds import bounds_of
-from .config import ConfigSPH
 from .force_warp import Forcing, width_of
 from .particle import Smoothing
 from .settling import disorder
 from .settling_warp import Settling, told_of
 from .strain_warp import MATTER, Straining
+from .traits import TraitsSPH
 
 STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
-SPRAYED = 3.0  # particles across what is fed below which a paste that lands is sprayed: seen at 2.4, not at 3.4
 BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
-FASTEST = 0.8  # Mach number beyond which shocks make matter too dense for its lists
-FASTEST_GROWTH = 0.3  # the same for foam that expands: its halves are pressed together
 
 
 def weights(h: float, implicit: bool) -> Weights:
@@ -53,78 +41,11 @@ def weights(h: float, implicit: bool) -> Weights:
     return weights if implicit else replace(weights, drag=lambda r: wendland_slope(r / h, h) / (r * r))
 
 
-class SolverSPH(Solver):
+class SolverSPH(TraitsSPH):
     """WCSPH with Wendland C2 kernel, delta-SPH density diffusion, mirror-image walls, symplectic Euler."""
 
-    name = "sph"
-    rank = 2
-    paradigm = "Lagrangian particles, kernel sums over neighbours, pressure from an equation of state"
-    shares_threads = True
-    features = frozenset(Feature)
-    backends: ClassVar = tuple(BACKENDS)
-    lacking: ClassVar = LACKING
-    Config: ClassVar = ConfigSPH
     passes = ("lists", "pack", "strain", "force", "drag", "move")
     OWN: ClassVar = ("matter", "new_density", "state", "shift", "acceleration", "told")
-    faults: ClassVar = {FAULT_NEIGHBOURS: "matter is more than 1.7 times too dense: a neighbour list is full"}
-
-    typical_rate, typical_bytes = 5.0e5, 1400.0
-    bare: ClassVar = {
-        "density_diffusion": 0.0,
-        "density_feedback": 0.0,
-        "artificial_viscosity": 0.0,
-        "artificial_viscosity_solid": 0.0,
-        "hourglass": 0.0,
-        "shifting": 0.0,
-    }
-
-    @classmethod
-    def weight_of_a_step(cls, scenario: Scenario, config: Any) -> float:
-        return WORTH if config.viscosity == "implicit" else 1.0
-
-    @classmethod
-    def decided(cls, scenario: Scenario, config: Any) -> Any:
-        return decided(cls, scenario, config)
-
-    @classmethod
-    def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:
-        key = config.smoothing_key(scenario.material)
-        return [
-            Economy("fewer neighbours", {key: round(max(0.8 * getattr(config, key), 1.2), 3)}),
-            Economy("larger dt", {"cfl": 2.0 * config.cfl, "viscous_number": 0.11}),
-            Economy("no shifting", {"shifting": 0.0}),
-        ]
-
-    @classmethod
-    def theory(cls, scenario: Scenario, config: Any) -> float:
-        ratio = config.smoothing(scenario.material)
-        if config.viscosity == "implicit":
-            scenario = scenario.made_of(scenario.material.model_copy(update={"viscosity": 0.0}))
-        return stable_dt(cls, scenario, config, *sph_numbers(ratio, config.cfl, config.viscous_number))
-
-    @classmethod
-    def approximates(cls, scenario: Scenario, config: Any) -> list[str]:
-        across = scenario.narrowest / scenario.spacing
-        if not scenario.emits or not scenario.material.elastic or across >= SPRAYED:
-            return []
-        return [f"{across:.2g} particles across what is fed: below {SPRAYED:g} what lands is sprayed about"]
-
-    @classmethod
-    def refuses(cls, scenario: Scenario, config: Any) -> str | None:
-        speed, c = scenario.reference_speed, scenario.wave_speed
-        expansion = scenario.material.expansion
-        if expansion is not None and (reason := crowded(expansion)):
-            return reason
-        if speed < (FASTEST if expansion is None else FASTEST_GROWTH) * c:
-            return None
-        return (
-            f"it moves at {speed:.3g} m/s, too near its own sound ({c:.3g} m/s): particles would be pushed "
-            "through each other; raise material.youngs_modulus, bulk_modulus or sound_speed"
-        )
-
-    @classmethod
-    def bounds(cls, scenario: Scenario, config: Any, speed: float) -> list[Bound]:
-        return bounds_of(scenario, config, speed)
 
     def __init__(self, scene: Scene, pool: Pool, config: Any, backend: str = "warp", threads: int = 1) -> None:
         self.scene, self.pool, self.config = scene, pool, config
