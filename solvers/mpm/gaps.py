@@ -10,7 +10,7 @@ they smooth of it. So a node with less than the geometric mean of those on both 
 
 where that mean is at least half of what a full node holds, as on a free surface (more than that counts as full), and
 the sides approach at more than a tenth of the speed with which matter comes there. What lies with a groove between,
-as layers do, approaches at less than a hundredth of it however loaded: it has met. In a gap each particle goes on
+as layers do, approaches more slowly however loaded: it has met. In a gap each particle goes on
 with what it gave to the node, its own momentum and the push of its own stress, in place of the mean of all,
 
     v_ip = v_i + g (v_p + (C_p - 4 dt V0 tau / (m_p dx^2)) (x_i - x_p) + dt force - v_i)
