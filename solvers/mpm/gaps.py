@@ -1,4 +1,4 @@
-"""Bodies of MPM's matter that come together do not feel each other before they meet.
+"""Bodies of MPM's matter that come together feel less of each other before they meet.
 
 From a gap of two cells on they share nodes, where the momentum of one becomes the other's: the gap closes as a strain
 of the matter on both sides, which resists, and layers came to rest up to a cell apart, J saying that they were full.
@@ -15,8 +15,8 @@ with what it gave to the node, its own momentum and the push of its own stress, 
 
     v_ip = v_i + g (v_p + (C_p - 4 dt V0 tau / (m_p dx^2)) (x_i - x_p) + dt force - v_i)
 
-The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. Until they
-meet nothing pushes, drags or strains. Nodes that a wall or the piston acts on are left alone.
+The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. Through
+such nodes nothing pushes, drags or strains. Nodes that a wall or the piston acts on are left alone.
 """
 
 import math
