@@ -19,7 +19,7 @@ class ConfigMPM(Config):
         "settle towards the room that there is; beside a body shifting goes into gaps, too",
     )
     separation: Annotated[float, Field(ge=0)] = Field(
-        0.5, description="shift of particles that are too near each other, over strain and crowding"
+        1.0, description="shift of particles that are too near each other, over strain and crowding"
     )
     viscosity: Scheme = Field(
         "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"

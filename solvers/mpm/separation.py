@@ -2,10 +2,11 @@
 
 Where matter is sheared, particles that a grid carries along come as near to each other as they like: no stress resists
 what has no velocity gradient. They line up in threads with gaps between, and what is measured finer than a cell finds
-less matter than there is. So every few ticks, where matter flows, pairs nearer than 0.9 spacings leave each other as in
+less matter than there is. So every few ticks, where matter flows, pairs nearer than a spacing leave each other as in
 SPH (../crowding.py), in proportion to the strain meanwhile. What the grid does see of these shifts, their mean over its
-nodes, is taken off again: it would widen whatever is strained (a flattened drop by 6 % of its radius), for no volume
-ratio knows of it. Velocities stay: the momentum of nodes is changed by no more than how the field bends within a cell.
+nodes, is taken off again, and once more of what is left: it would widen whatever is strained (a flattened drop by 6 %
+of its radius), for no volume ratio knows of it. Velocities stay: the momentum of nodes is changed by no more than how
+the field bends within a cell.
 
 What has grown is evened out as well, as in SPH (../corrected.py): the halves of split particles lie as they were
 born, and where none is within a cell the grid finds a gap in what should be full.
@@ -19,13 +20,14 @@ from fluidbench.method.frame import FREE
 from fluidbench.native.crew import index_of
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import PERIODIC, Box, Phase, Scene
+from fluidbench.native.vector_access import joined
 
 from ..aging import GROWN, rest_density
 from ..backends import Warp
 from ..bind import warp_func
 from ..cells import Cells, WhoIsWhere, bucket_of, cell_of, place
 from ..corrected import enclosed, least_eigenvalue
-from ..crowding import CLOSE, FARTHEST, excess, nearest, out_of_crowd
+from ..crowding import excess, farthest, nearest, out_of_crowd
 from ..flow import flows, shear_rate
 from ..images import face_kind, has_choice, image_position, near_faces, undoing
 from ..pairs import floats
@@ -39,6 +41,8 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 EVERY = 4  # ticks: in each matter goes a quarter of a spacing at most
 KERNEL = 1.5  # smoothing length of the crowding, in spacings: SPH's in matter that lies in no order
+CLOSE = 1.0  # distance below which particles are moved apart, in spacings: nothing in a lattice is
+TEAM = 8  # threads that look around a particle on a GPU: alone each waits for 27 cells, one after the other
 LONGEST = wp.constant(0.25)  # shift at a time, in spacings: as far as matter goes in a tick
 
 slope = warp_func(wendland_slope)
@@ -51,7 +55,8 @@ class Apart:
 
     h: float  # smoothing length [m]
     near: float  # kernel at the distance below which partners crowd each other [1/m^3]
-    strain: float  # shift over the rate of shear and h^2 crowding [s]
+    strain: float  # shift over the rate of shear and h^2 crowding [s],
+    farthest: float  # and over h^2 crowding at most [-]
     evens: int  # 1 where matter grows, and is evened out
 
 
@@ -65,17 +70,19 @@ def through(
     x: wp.vec3,
     code: int,
     volume: wp.array(dtype=float),
+    member: int,
+    team: int,
     sums: Sums,
 ):
     """The sums of particle i at x, gone on with over the images of all of this code, its own as well, or the others
-    themselves (0)."""
+    themselves (0), in the cells of one member of a team."""
     signs = wp.vec3(1.0, 1.0, 1.0)
     for axis in range(3):
         if face_kind(box, code, axis) != PERIODIC:
             signs[axis] = -1.0
     at = image_position(box, x, undoing(box, code))  # where it sees others as it sees their images from x
     middle = cell_of(at, cells.width)
-    for c in range(27):
+    for c in range(member, 27, team):
         bucket = bucket_of(cells, world, around(middle, c))
         start = cells.start[bucket]
         for m in range(start, start + cells.number[bucket]):
@@ -115,18 +122,22 @@ def separate(
     elastic_shear: wp.array(dtype=wp.vec3),
     plastic: wp.array(dtype=float),
     dt: wp.array(dtype=float),
+    team: int,
     # outputs
     shift: wp.array(dtype=wp.vec4),
 ):
     """How far each particle is to be shifted [m], and 1 if it takes part: if it is a liquid's, or would flow in a step
     as it is."""
-    i = index_of(share, wp.tid())
+    thread = index_of(share, wp.tid())
+    i = thread / team
     world = i / capacity
-    if i - world * capacity < count[world]:
-        found = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        phase = phases[world, phase_of[i]]
+    active = i - world * capacity < count[world]
+    phase = phases[world, phase_of[i]]
+    flowing = bool(False)
+    sums = Sums()
+    if active and held[i] == FREE:
         flowing = flows(phase, affine[i], elastic_normal[i], elastic_shear[i], dt[world], i, plastic)
-        if held[i] == FREE and flowing:
+        if flowing:
             x = position[i]
             near = near_faces(box, x, cells.width, True)
             walled = near_faces(box, x, cells.width, False)
@@ -135,17 +146,21 @@ def separate(
             codes = int(1)
             if near[0] + near[1] + near[2] > 12:
                 codes = 27
-            sums = Sums()
             for code in range(codes):
                 if has_choice(near, code):
-                    sums = through(num, box, cells, world, i, x, code, volume, sums)
+                    sums = through(num, box, cells, world, i, x, code, volume, thread - i * team, team, sums)
+    for k in range(12):
+        sums[k] = joined(sums[k], team)
+    if active and thread == i * team:
+        found = wp.vec4(0.0, 0.0, 0.0, 0.0)
+        if flowing:
             crowd = wp.vec3(sums[0], sums[1], sums[2])
             if num.evens == 1 and rest_density(mass, volume, i) < GROWN * phase.density:
                 moment = wp.mat33(
                     sums[6], sums[9], sums[10], sums[9], sums[7], sums[11], sums[10], sums[11], sums[8]
                 )  # fmt: skip
                 crowd += enclosed(least_eigenvalue(moment)) * wp.vec3(sums[3], sums[4], sums[5])
-            by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]), FARTHEST)
+            by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]), num.farthest)
             found = wp.vec4(by[0], by[1], by[2], 1.0)
         shift[i] = found
 
@@ -167,6 +182,26 @@ def spread(
     world = p / capacity
     if p - world * capacity < count[world] and shift[p][3] > 0.0:
         tell_nodes(grid, world, position[p], True, mass[p] * shift[p], table, nodes)
+
+
+@wp.kernel
+def take_off(
+    share: wp.vec3i,
+    grid: Grid,
+    capacity: int,
+    count: wp.array(dtype=int),
+    position: wp.array(dtype=wp.vec3),
+    table: wp.array(dtype=int),
+    nodes: wp.array(dtype=wp.vec4),
+    # outputs
+    shift: wp.array(dtype=wp.vec4),
+):
+    """Off each shift the mean of them that its nodes see."""
+    p = index_of(share, wp.tid())
+    world = p / capacity
+    if p - world * capacity < count[world] and shift[p][3] > 0.0:
+        mean = mean_of_nodes(grid, world, position[p], True, table, nodes)
+        shift[p] = shift[p] - wp.vec4(mean[0], mean[1], mean[2], 0.0)
 
 
 @wp.kernel
@@ -207,13 +242,15 @@ class Separation:
         self.elastic = [pool.elastic_normal, pool.elastic_shear, plastic]
         num = self.num = Apart()
         num.h = KERNEL * scene.spacing
-        num.near = nearest(scene.spacing, num.h)
+        r0 = CLOSE * scene.spacing
+        num.near, num.farthest = nearest(r0, num.h), farthest(scene.spacing, r0, num.h)
         num.strain = constant * EVERY * scene.clock.tick
         num.evens = int(scene.expands)
         with wp.ScopedDevice(scene.device):
             self.shift = wp.zeros(pool.size, dtype=wp.vec4)
             self._nobody = wp.zeros(1, dtype=int)
-        self.who = WhoIsWhere(scene, pool, 2.0 * num.h if scene.expands else CLOSE * scene.spacing)
+        self.who = WhoIsWhere(scene, pool, 2.0 * num.h if scene.expands else r0)
+        self.team = 1 if scene.device.is_cpu else TEAM
         self.backend = Warp(scene.crew)
 
     def prepare(self) -> None:
@@ -228,10 +265,12 @@ class Separation:
         pool, scene, launch = self.pool, self.scene, self.backend.launch
         some = [pool.capacity, pool.count]
         matter = [pool.phase, pool.held, pool.position, pool.mass, pool.volume, pool.affine, *self.elastic, scene.dt]
+        asked = [self.num, scene.box, self.who.cells, *some, scene.phases, *matter, self.team]
         self.who.tell(self.backend)
-        launch(separate, pool.size, [self.num, scene.box, self.who.cells, *some, scene.phases, *matter], [self.shift])
-        launch(clear_grid, lanes, [active, lanes], [nodes])
-        launch(spread, pool.size, [self.grid, *some, pool.position, pool.mass, self.shift, table], [nodes])
+        launch(separate, pool.size * self.team, asked, [self.shift])
+        self._spread(table, active, nodes, lanes)
+        launch(take_off, pool.size, [self.grid, *some, pool.position, table, nodes], [self.shift])
+        self._spread(table, active, nodes, lanes)
         launch(
             shift_apart,
             pool.size,
@@ -245,6 +284,12 @@ class Separation:
                 pool.fault,
             ],
         )
+
+    def _spread(self, table: wp.array, active: wp.array, nodes: wp.array, lanes: int) -> None:
+        pool, launch = self.pool, self.backend.launch
+        launch(clear_grid, lanes, [active, lanes], [nodes])
+        inputs = [self.grid, pool.capacity, pool.count, pool.position, pool.mass, self.shift, table]
+        launch(spread, pool.size, inputs, [nodes])
 
     def footprint(self) -> dict[str, int]:
         return {"separation": self.shift.capacity + self.who.footprint()}

@@ -22,6 +22,9 @@ LEVELLED = wp.constant(32.0)
 # pressed together come to 0.54 d by 4 times as much, to 0.66 by 8, to 0.72 by 12 and 0.73 by 16, in every substep; all
 # else stays. Between ticks most of it is beyond what a pair can be moved by at once (`farthest`), and it is 0.62.
 PARTED = wp.constant(12.0)
+CLOSE = 0.9  # r0 of crowding.py: distance below which particles are moved apart, in spacings
+# Of h^2 crowd, at a time, for what carries tension: `farthest` at h = 1.5 d; pastes' 1.3 d ask for 0.06 (not tried).
+FARTHEST = wp.constant(0.2)
 
 slope = warp_func(wendland_slope)
 

@@ -25,7 +25,7 @@ from ..tool_map import Weights
 from ..viscosity import ImplicitViscosity, beside
 from . import kernels_warp as kernels
 from .force_warp import Forcing, width_of
-from .particle import Smoothing
+from .particle import CLOSE, Smoothing
 from .settling import disorder
 from .settling_warp import Settling, told_of
 from .strain_warp import MATTER, Straining
@@ -58,15 +58,16 @@ class SolverSPH(TraitsSPH):
         self.num = Smoothing()
         ratio = config.smoothing(scene.scenario.material)
         self.num.h = ratio * scene.spacing
-        self.num.near = nearest(scene.spacing, self.num.h)
-        self.num.broken = crowding(BROKEN * scene.spacing, scene.spacing, self.num.h)
+        self.num.near = nearest(CLOSE * scene.spacing, self.num.h)
+        self.num.broken = crowding(BROKEN * scene.spacing, scene.spacing, CLOSE * scene.spacing, self.num.h)
         self.num.lattice, self.num.viscous_lattice = 1.0 / lattice_moments(ratio)[0], viscous_scale(ratio)
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.compact = (scene.spacing / opposing(ratio)) ** 2
         self.num.hourglass = config.hourglass
         self.num.shifting = config.shifting
-        self.num.spacing, self.num.farthest = scene.spacing, farthest(scene.spacing, self.num.h)
+        self.num.spacing = scene.spacing
+        self.num.farthest = farthest(scene.spacing, CLOSE * scene.spacing, self.num.h)
         self.num.evened = scene.spacing**2 / float(sloping(ratio)[1].sum())
         self.num.density_feedback = config.density_feedback
         self.num.density_tolerance, self.num.disorder = config.density_tolerance, disorder(ratio)

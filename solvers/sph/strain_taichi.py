@@ -15,7 +15,6 @@ from ..corrected_taichi import (
     strain_by_chords,
     symmetric_inverse,
 )
-from ..crowding import FARTHEST
 from ..flow_taichi import pressure, shear_rate, strained
 from ..hourglass_taichi import off_linear_after
 from ..neighbours_taichi import BoxT, ListsT, image_gradient, image_velocity
@@ -44,7 +43,7 @@ from ..taichi_bridge import (
     vec4,
 )
 from .force_warp import width_of
-from .particle import LEVELLED
+from .particle import FARTHEST, LEVELLED
 from .particle_taichi import SmoothingT, crowded, damped, excess, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 

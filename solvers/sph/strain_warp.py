@@ -21,14 +21,14 @@ from ..corrected import (
     strain_by_chords,
     symmetric_inverse,
 )
-from ..crowding import FARTHEST, excess, out_of_crowd
+from ..crowding import excess, out_of_crowd
 from ..flow import pressure, shear_rate, strained
 from ..hourglass import off_linear
 from ..images import image_gradient, image_velocity
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
-from .particle import LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
+from .particle import FARTHEST, LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from fluidbench.method.frame import CARRIED, CLAMPED
 from fluidbench.native.simulation import Simulation
 from solvers.crowding import crowding
-from solvers.mpm.separation import EVERY, KERNEL
+from solvers.mpm.separation import CLOSE, EVERY, KERNEL
 
 from ..conftest import scenario
 
@@ -63,8 +63,9 @@ def test_a_pair_leaves_each_other_as_fast_as_matter_shears_and_nothing_else_move
     x = sim.pool.snapshot()["position"]
     close = np.abs(x[:, 0]) < 0.2 * D
     by = moves(sim)
-    strain = 0.5 * EVERY * sim.tick * rate
-    alone = strain * (KERNEL * D) ** 2 * crowding(0.3 * D, D, KERNEL * D)  # before the mean over nodes is taken off
+    strain = EVERY * sim.tick * rate
+    # before the mean over nodes is taken off
+    alone = strain * (KERNEL * D) ** 2 * crowding(0.3 * D, D, CLOSE * D, KERNEL * D)
     assert (np.sign(by[close, 0]) == np.sign(x[close, 0])).all()
     assert 0.6 * alone < np.abs(by[close, 0]).min() and np.abs(by[close, 0]).max() < alone
     others = np.abs(by[~close]).max()

@@ -11,13 +11,13 @@ from fluidbench.native.scene import Phase
 from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import define
-from solvers.crowding import CLOSE, FARTHEST, crowding, farthest, out_of_crowd
+from solvers.crowding import crowding, farthest, out_of_crowd
 from solvers.flow import shear_rate
 from solvers.hourglass import off_linear
 from solvers.lattice import hourglass_limit, lattice_moments, opposing, viscous_scale
 from solvers.smoothing import wendland, wendland_slope
 from solvers.sph import particle
-from solvers.sph.particle import PARTED
+from solvers.sph.particle import CLOSE, FARTHEST, PARTED
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
 SIDE = 8
@@ -133,20 +133,21 @@ def test_particles_leave_a_crowd_as_fast_as_matter_shears():
     assert list(out_of_crowd(crowd, 0.5, 1e9, 0.2)) == pytest.approx([-0.1, 0.0, 0.05])  # no farther
 
 
+@pytest.mark.parametrize("r0", [0.9, 1.0])
 @pytest.mark.parametrize("h", [1.3, 1.5, 1.8, 2.5])
-def test_a_pair_that_parts_never_changes_places_with_others(h):
+def test_a_pair_that_parts_never_changes_places_with_others(h, r0):
     """Of pairs as near as may be each is then nearer than those that were farther apart, none beyond where it would
     have been left alone; a little more, and some would be."""
-    near = np.linspace(0.0, CLOSE, 400)
-    push = np.array([h * h * crowding(r, 1.0, h) for r in near])
-    after = near + 2.0 * farthest(1.0, h) * push
-    assert np.all(np.diff(after) > -1e-5) and after.max() <= CLOSE + 1e-5
-    assert np.any(np.diff(near + 2.2 * farthest(1.0, h) * push) < 0.0)
-    assert farthest(0.01, 0.01 * h) == pytest.approx(farthest(1.0, h))
+    near = np.linspace(0.0, r0, 400)
+    push = np.array([h * h * crowding(r, 1.0, r0, h) for r in near])
+    after = near + 2.0 * farthest(1.0, r0, h) * push
+    assert np.all(np.diff(after) > -1e-5) and after.max() <= r0 + 1e-5
+    assert np.any(np.diff(near + 2.2 * farthest(1.0, r0, h) * push) < 0.0)
+    assert farthest(0.01, 0.01 * r0, 0.01 * h) == pytest.approx(farthest(1.0, r0, h))
 
 
 def test_how_far_pastes_are_shifted_at_a_time_is_that_of_their_kernel():
-    assert float(FARTHEST) == pytest.approx(farthest(1.0, 1.5), rel=0.05)
+    assert float(FARTHEST) == pytest.approx(farthest(1.0, CLOSE, 1.5), rel=0.05)
 
 
 def sheared(simulation, places):
@@ -190,8 +191,8 @@ def test_only_near_partners_crowd_each_other(material, gap, moves):
     else:
         assert shift[0] < 0.0 < shift[1]
     if gap == 0.5:  # what else is near adds little
-        left = crowding(0.6, 1.0, 1.5) if material is ELASTIC else 0.0
-        assert shift[1] - shift[0] == pytest.approx(2.0 * (crowding(0.5, 1.0, 1.5) - left), rel=0.35)
+        left = crowding(0.6, 1.0, CLOSE, 1.5) if material is ELASTIC else 0.0
+        assert shift[1] - shift[0] == pytest.approx(2.0 * (crowding(0.5, 1.0, CLOSE, 1.5) - left), rel=0.35)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -215,9 +216,9 @@ def test_walls_crowd_no_liquid(material, moves):
 
 def test_crowding_by_one_partner_by_hand():
     excess = (wendland(0.5 / 1.5, 1.5) / wendland(0.9 / 1.5, 1.5)) ** 4 - 1.0
-    assert crowding(0.5, 1.0, 1.5) == pytest.approx(-wendland_slope(0.5 / 1.5, 1.5) * 0.5 * excess)
-    assert crowding(0.005, 0.01, 0.015) == pytest.approx(100.0 * crowding(0.5, 1.0, 1.5))  # 1/m
-    assert crowding(0.9, 1.0, 1.5) == pytest.approx(0.0)
+    assert crowding(0.5, 1.0, CLOSE, 1.5) == pytest.approx(-wendland_slope(0.5 / 1.5, 1.5) * 0.5 * excess)
+    assert crowding(0.005, 0.01, 0.009, 0.015) == pytest.approx(100.0 * crowding(0.5, 1.0, CLOSE, 1.5))  # 1/m
+    assert crowding(0.9, 1.0, CLOSE, 1.5) == pytest.approx(0.0)
 
 
 def test_sums_over_a_lattice_by_hand():
