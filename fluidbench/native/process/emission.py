@@ -44,8 +44,8 @@ def inside_nozzle(pipe: Pipe, number: int, hours: Hours, row: int):
 
 
 @wp.kernel
-def insert(
-    lanes: int,
+def feed(
+    share: wp.vec3i,
     hours: Hours,
     pipe: Pipe,
     inserted: wp.array(dtype=int),
@@ -54,54 +54,28 @@ def insert(
     count: wp.array(dtype=int),
     # outputs
     position: wp.array(dtype=wp.vec3),
+    velocity: wp.array(dtype=wp.vec3),
     mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     held: wp.array(dtype=int),
     birth_time: wp.array(dtype=float),
     origin: wp.array(dtype=int),
 ):
-    """Put what the stream feeds now into the nozzle of each world, behind all that is there."""
-    world, lane = wp.tid()
-    row = hours.row[0]
-    number = inserted[0] + lane
-    slot = world * capacity + count[world] + lane
-    while number < hours.entered[row]:
-        position[slot] = inside_nozzle(pipe, number, hours, row)
-        volume[slot] = pipe.volume
-        mass[slot] = pipe.volume * densities[world, 0]
-        held[slot] = CARRIED
-        birth_time[slot] = pipe.birth_time[number / pipe.points]
-        origin[slot] = pipe.first_origin + number
-        number += lanes
-        slot += lanes
-
-
-@wp.kernel
-def admit(hours: Hours, inserted: wp.array(dtype=int), count: wp.array(dtype=int)):
-    """What was put in counts from now on."""
-    entered = hours.entered[hours.row[0]]
-    for world in range(count.shape[0]):
-        count[world] = count[world] + wp.max(entered - inserted[0], 0)
-    inserted[0] = wp.max(entered, inserted[0])
-
-
-@wp.kernel
-def push(
-    share: wp.vec3i,
-    hours: Hours,
-    pipe: Pipe,
-    capacity: int,
-    count: wp.array(dtype=int),
-    origin: wp.array(dtype=int),
-    # outputs
-    position: wp.array(dtype=wp.vec3),
-    velocity: wp.array(dtype=wp.vec3),
-    held: wp.array(dtype=int),
-):
-    """Release the particles whose time has come and move the others on to their place at the next tick."""
+    """Put what the stream feeds now into the nozzle of each world, behind all that is there; release the particles
+    whose time has come and move the others on to their place at the next tick."""
     i = index_of(share, wp.tid())
+    world = i / capacity
     row = hours.row[0]
-    if i % capacity < count[i / capacity] and held[i] == CARRIED:
+    fresh = i - world * capacity - count[world]  # that it is among those put in now, if not negative
+    if fresh >= 0 and fresh < hours.entered[row] - inserted[0]:
+        number = inserted[0] + fresh
+        position[i] = inside_nozzle(pipe, number, hours, row)
+        volume[i] = pipe.volume
+        mass[i] = pipe.volume * densities[world, 0]
+        held[i] = CARRIED
+        birth_time[i] = pipe.birth_time[number / pipe.points]
+        origin[i] = pipe.first_origin + number
+    if fresh < wp.max(hours.entered[row] - inserted[0], 0) and held[i] == CARRIED:
         number = origin[i] - pipe.first_origin
         layer = number / pipe.points
         offset = pipe.offsets[number]
@@ -112,6 +86,15 @@ def push(
             position[i] = pipe.release_point[layer] + wp.vec3(offset[0], offset[1], 0.0) + late * velocity[i]
         else:
             velocity[i] = (inside_nozzle(pipe, number, hours, row + 1) - position[i]) / hours.tick
+
+
+@wp.kernel
+def admit(hours: Hours, inserted: wp.array(dtype=int), count: wp.array(dtype=int)):
+    """What was put in counts from now on."""
+    entered = hours.entered[hours.row[0]]
+    for world in range(count.shape[0]):
+        count[world] = count[world] + wp.max(entered - inserted[0], 0)
+    inserted[0] = wp.max(entered, inserted[0])
 
 
 class Emission:
@@ -167,20 +150,21 @@ class Emission:
         """Enqueue what the hour of the clock brings: insert, release, and move what is in the nozzle on its way to its
         place one tick later."""
         pool, launch, hours = self.pool, self.scene.crew.launch, self.scene.clock.hours
-        lanes = len(self.stream.offsets)
         launch(
-            insert,
-            (pool.worlds, lanes),
-            [lanes, hours, self.pipe, self._inserted, self.densities, pool.capacity, pool.count],
-            [pool.position, pool.mass, pool.volume, pool.held, pool.birth_time, pool.origin],
+            feed,
+            pool.size,
+            [hours, self.pipe, self._inserted, self.densities, pool.capacity, pool.count],
+            [
+                pool.position,
+                pool.velocity,
+                pool.mass,
+                pool.volume,
+                pool.held,
+                pool.birth_time,
+                pool.origin,
+            ],
         )
         launch(admit, 1, [hours, self._inserted, pool.count])
-        launch(
-            push,
-            pool.size,
-            [hours, self.pipe, pool.capacity, pool.count, pool.origin],
-            [pool.position, pool.velocity, pool.held],
-        )
 
     def advance(self, now: float, tick: float) -> None:
         """All of it at any time `now` [s], for a tick of any length [s]."""
