@@ -132,10 +132,10 @@ def separate(
     i = thread / team
     world = i / capacity
     active = i - world * capacity < count[world]
-    phase = phases[world, phase_of[i]]
     flowing = bool(False)
     sums = Sums()
     if active and held[i] == FREE:
+        phase = phases[world, phase_of[i]]
         flowing = flows(phase, affine[i], elastic_normal[i], elastic_shear[i], dt[world], i, plastic)
         if flowing:
             x = position[i]
@@ -154,6 +154,7 @@ def separate(
     if active and thread == i * team:
         found = wp.vec4(0.0, 0.0, 0.0, 0.0)
         if flowing:
+            phase = phases[world, phase_of[i]]
             crowd = wp.vec3(sums[0], sums[1], sums[2])
             if num.evens == 1 and rest_density(mass, volume, i) < GROWN * phase.density:
                 moment = wp.mat33(
