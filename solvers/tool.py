@@ -15,6 +15,7 @@ wp.set_module_options({"enable_backward": False})
 
 FOURS = wp.constant(QUADS)
 NEAREST = 0.25  # spacings in front of the surface, nearer than which nothing is taken to be for its velocity
+FAR = wp.constant(1.0e9)  # [m]
 INSET = 0.2  # closest approach to it [spacings]; at rest the first layer is at 0.5
 
 
@@ -142,38 +143,22 @@ def seen_by_tool(tool: Tool, found: Felt, v: wp.vec3):
 
 
 @wp.func
-def outside(tool: Tool, x: wp.vec3):
-    """A position, kept in front of the surface."""
-    back = x
+def distance_to(tool: Tool, x: wp.vec3):
+    """(distance of a point in front of the surface [m], FAR where the table ends; the normal)"""
+    gap, normal = FAR, wp.vec3(0.0, 0.0, 1.0)
     at, f, g, out = cell_of_table(tool, x)
     if at >= 0:
         place = entry(tool, at, f, g, 0)
-        if place[0] < tool.inset:
-            normal = wp.normalize(place[1] * out + place[2] * wp.vec3(0.0, 0.0, 1.0))
-            back = x + (tool.inset - place[0]) * normal
-    return back
+        gap = place[0]
+        normal = wp.normalize(place[1] * out + place[2] * wp.vec3(0.0, 0.0, 1.0))
+    return gap, normal
 
 
 @wp.func
-def mirrored(tool: Tool, x: wp.vec3, reach: float):
-    """(the image of a point as near as `reach`; the space behind the surface over that in front of it, 0 where there is
-    no image; the normal): seen in the surface nearest to both."""
-    image, fill, normal = x, float(0.0), wp.vec3(0.0, 0.0, 1.0)
-    at, f, g, out = cell_of_table(tool, x)
-    if at >= 0:
-        place = entry(tool, at, f, g, 0)
-        if place[0] < reach:
-            gap = wp.max(place[0], 0.0)
-            normal = wp.normalize(place[1] * out + place[2] * wp.vec3(0.0, 0.0, 1.0))
-            image = x - 2.0 * gap * normal
-            behind, f, g, _out = cell_of_table(tool, image)
-            if behind >= 0:
-                depth = -entry(tool, behind, f, g, 0)[0]
-                if wp.abs(depth - gap) < tool.inset:
-                    away, mirror = x - place_of(tool.pose), image - place_of(tool.pose)
-                    radius = wp.sqrt(away[0] * away[0] + away[1] * away[1])
-                    fill = wp.sqrt(mirror[0] * mirror[0] + mirror[1] * mirror[1]) / wp.max(radius, tool.inset)
-    return image, fill, normal
+def outside(tool: Tool, x: wp.vec3):
+    """A position, kept in front of the surface."""
+    gap, normal = distance_to(tool, x)
+    return x + wp.max(tool.inset - gap, 0.0) * normal
 
 
 @wp.kernel

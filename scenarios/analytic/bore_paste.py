@@ -31,5 +31,4 @@ CASE = replace(
     source="exact: Buckingham-Reiner",
     spacing=DIAMETER / 12,
     scenarios=scenarios,
-    skipped={"pbd": "it has no pressure", "mpm": "its flow along a body is not stable for a paste"},
 )

@@ -89,7 +89,6 @@ CASE = Case(
     tolerance=TOLERANCE,
     scenarios=scenarios,
     evaluate=evaluate,
-    skipped={"mpm": "its flow along a body is not stable for a paste"},
     causes={
         "sph": "5 to 11 % too wide: a dome with a wide foot where printed strands bulge. Neither gravity, stiffness, "
         "yield stress, consistency nor the tip's size changes the shape, and PBD's is wide, too: it may be the law's, "

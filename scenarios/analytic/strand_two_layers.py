@@ -113,7 +113,6 @@ CASE = Case(
     tolerance=TOLERANCE,
     scenarios=scenarios,
     evaluate=evaluate,
-    skipped={"mpm": "its flow along a body is not stable for a paste"},
     causes={
         "sph": "the notch is 25 and 17 % too high in two of six rows (ID2, LM30), whose published outlines hold 14 and "
         "6 % less than a strand's matter; ID2 departs further at D / 12; all else within 14 %",

@@ -11,17 +11,12 @@ ACROSS = 6.0  # cells across a bore: with fewer its resistance can be off by mor
 
 
 def unpressed(scenario: Scenario, config: Any) -> str | None:
-    """Why it cannot: its images (tool.py) would shake, or what feeds the bore ends within reach of what flows; None
-    where it can, or there is no body."""
+    """Why it cannot: where viscosity is solved for no nodes are tied (tied.py), or what feeds a bore ends within reach
+    of what flows; None where it can, or there is no body."""
     if scenario.fed_from is None:
         return None
-    for wrong, what in (
-        (not scenario.sticks, "slips along it"),
-        (any(m.elastic for m in scenario.aged[1]), "is elastic or yields"),
-        (config.viscosity == "implicit", "has its viscosity solved for (use viscosity = 'explicit')"),
-    ):
-        if wrong:
-            return f"its flow along a body is not stable for matter that {what}"
+    if config.viscosity == "implicit":
+        return "it does not solve for viscosity beside a body; use numerics.mpm.viscosity = 'explicit'"
     dx = float(cells_of(scenario.domain, config.grid_ratio * scenario.spacing)[1][2])
     if (COLUMN - 0.5) * scenario.spacing < 1.5 * dx:
         return f"its cells ({dx:.3g} m) are too large to feed a bore; use numerics.mpm.grid_ratio = 1"

@@ -30,7 +30,7 @@ from .nodes import room_of, tell_nodes
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 TURNS = 4  # of separation for one of settling, which costs as much as a substep
-COMPRESSED = 0.02  # of J: twice what a sound speed of ten times the flow's leaves
+COMPRESSED = wp.constant(0.02)  # of J: twice what a sound speed of ten times the flow's leaves
 SURFACE = wp.constant(0.9)  # what a flat free surface lacks at most, over |dx grad(phi)|
 
 

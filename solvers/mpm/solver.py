@@ -57,6 +57,7 @@ class SolverMPM(TraitsMPM):
             self.table = wp.zeros(blocks, dtype=int)
             self.block_of = wp.zeros(slots, dtype=int)
             self.active = wp.zeros(1, dtype=int)
+            self.blocks = self.table, self.block_of, self.active
             self.raw = wp.empty(slots * 64, dtype=NODE)
             self.moving = wp.empty(slots * 64, dtype=NODE)
         self.started = False
@@ -67,11 +68,13 @@ class SolverMPM(TraitsMPM):
         )
         many = min(scene.lanes, slots * 64, max(pool.size, 1024))  # nodes are fewer than particles
         self.node_lanes = scene.crew.threads if scene.device.is_cpu else many
-        self.held = None if scene.outline is None else Held(scene, pool, self.grid, slots, self.shifting)
+        self.held = None
+        if scene.outline is not None:
+            self.held = Held(scene, pool, self.grid, slots, self.node_lanes, self.strains[-1], self.shifting)
         clamps = any(body.clamped for scenario in scene.scenarios for body in scenario.bodies)
         self.clamps = Clamps(scene, pool, self.grid) if clamps else None
         self.viscosity = GridViscosity(self, config.viscous_tolerance) if implicit else None
-        apart = config.separation > 0.0 and self.held is None
+        apart = config.separation > 0.0
         self.separation = Separation(scene, pool, self.grid, self.strains[-1], config.separation) if apart else None
         settles = config.shifting > 0.0 and self.held is None and scene.flows
         rate = TURNS * EVERY * config.shifting
@@ -168,7 +171,7 @@ class SolverMPM(TraitsMPM):
         drags = int(EXPLICIT if self.held is None else PRESSED) if self.viscosity is None else int(IMPLICIT)
         self.give(dt, drags, raw)
         if self.held is not None:
-            self.held.reflect(dt, self.table, raw)
+            self.held.tied.give(dt, self.blocks, raw)
         if self.clamps is not None:
             self.clamps.hold(self.table, raw)
 
@@ -202,6 +205,8 @@ class SolverMPM(TraitsMPM):
 
     def grid_step(self) -> None:
         self.walled(self.raw, self.scene.force, self.piston, self.moving)
+        if self.held is not None:
+            self.held.tied.trail(self.blocks, self.moving)
         if self.viscosity is not None:
             self.viscosity.solve()
 
@@ -237,7 +242,7 @@ class SolverMPM(TraitsMPM):
         if self.gaps is not None:
             self.gaps.go_on(*blocks, homes)
         if self.held is not None:
-            self.held.keep_out(*blocks, homes)
+            self.held.keep_out(self.blocks, homes)
 
     def gather(self) -> None:
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours

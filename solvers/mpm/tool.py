@@ -1,107 +1,47 @@
-"""A rigid body among the particles of MPM: they see it as a mirror, and stick to it.
+"""A rigid body among the particles of MPM: its nodes are tied (tied.py), what is near it settles, nothing enters it.
 
-What is in front of its surface has an image behind it, as far away: the same mass in the space that the mirror takes,
-the velocity 2 u - v that makes the mean that of the body, u, and the same stress. Nodes about the surface then find
-space filled on both sides, wherever it lies between them: a pressure pushes nothing along it, and the velocity goes
-through that of the body. It is what walls of the domain do on their nodes (walls.py), for a surface that moves and may
-be round. An image counts only where the surface nearest to it is the one that it is seen in: where a rim turns, those
-of both sides share the space behind it.
+Volume ratios drift apart from particle to particle where matter flows along a wall; so they diffuse, as densities do in
+SPH: J += dt DIFFUSION c / dx (<J> - J), <J> that of the nodes. What they drift by together stays: along a bore, where
+no free surface gives way, matter came to be packed by up to a quarter more than its J told. So what flows follows the
+room that there is, by its strain, and by way of nodes:
 
-What is gathered is that of nodes in front, not the transpose of what was scattered: a transfer amplifies by up to
-1.03, and a pressure makes energy. (The transpose would turn stress along the surface round, which pushes matter about
-wherever it is curved, and let the last of the images expand into the void behind them.) Viscous stress damps the
-velocity. What it leaves shows in the volume ratios, which drift apart from particle to particle until pressures tear
-the flow up; so they diffuse, as densities do in SPH: J += dt DIFFUSION c / dx (<J> - J), <J> that of the nodes. What
-they drift by together stays: along a bore matter came to be packed by up to a quarter more than its J told. Where there
-is no free surface matter shares its space, so there strain takes off what strain brings in: J += dt SETTLING
-|2 dev D| (<room> - J), less near free surfaces, of which a bore has none. (In proportion to strain, and by way of
-nodes: as particles pass nodes, their room flickers by some percent, and with a high speed of sound that is more than
-the pressure that drives them.)
+    J += dt SETTLING |2 dev D| <heard (room - J -+ margin)>      where |room - J| > margin
+
+heard is 0 beside free surfaces, of which a bore has none; the margin that of settling.py, but for the scatter, of which
+nodes hear only the mean. What is elastic has its 2 %, too: a room that flickers as particles pass nodes shakes what no
+viscosity damps, and that strains it, the more it follows. (Without any, a stiff paste blew up within 0.3 s.)
 
 Particles follow streamlines, and those nearest to a wall leave it where it turns: of what flows at s from the wall of a
 bore there is nothing nearer, and past the rim it flows at some 3 s from the face. No strain tells of the gap, and a
 strand let go of the face that should hold it. So here shifting goes both ways, into gaps, too; beside a free surface
 only towards the body. What it takes of volume, J learns as it settles.
-
-Nothing like it holds a paste, whose stress drifts, too; viscosity that is solved for, of which images know nothing; or
-what slips. All three are refused (pressed.py).
 """
 
 from typing import Any
 
 import warp as wp
 
-from fluidbench.method.frame import CLAMPED, FREE
+from fluidbench.method.frame import FREE
 from fluidbench.native.crew import index_of
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Phase, Scene
 
-from ..flow import shear_rate
-from ..tool import Tool, mirrored, outside, table_of, tool_of
-from .grid import Grid, first_node, node_at, node_parts, slots_of
+from ..flow import flows, shear_rate
+from ..tool import Tool, distance_to, outside, table_of, tool_of
+from .grid import Grid, first_node, node_parts, slots_of
 from .kernels_warp import sums_of
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
-from .particle import columns_scaled, contained, down_the_slope, kirchhoff, resistance_of, viscous, weights
+from .particle import contained, down_the_slope, weights
 from .piston import REACHED, Piston
+from .settling import COMPRESSED, SURFACE
+from .tied import REACH, Blocks, Tied
 
 wp.set_module_options({"enable_backward": False})
 
-REACH = 2.5  # of images [cells]: nodes behind the surface that particles in front of it read are then complete
+NEAR = 2.5  # of the body [cells]: nodes about what is so near are tied
 DIFFUSION = wp.constant(0.1)  # of J, over c dx; of densities: Antuono et al. 2010, Comput. Phys. Commun. 181:532
 SETTLING = wp.constant(32.0)  # of J towards the room that there is, over the strain: with 8 a bore is 2 % too full
 HALF = wp.constant(0.5)  # full: a node on a free surface
-
-
-@wp.kernel
-def reflect(
-    grid: Grid,
-    tool: Tool,
-    reach: float,
-    capacity: int,
-    count: wp.array(dtype=int),
-    dt: wp.array(dtype=float),
-    phases: wp.array2d(dtype=Phase),
-    phase_of: wp.array(dtype=int),
-    held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3),
-    velocity: wp.array(dtype=wp.vec3),
-    affine: wp.array(dtype=wp.mat33),
-    mass: wp.array(dtype=float),
-    volume: wp.array(dtype=float),
-    volume_ratio: wp.array(dtype=float),
-    table: wp.array(dtype=int),
-    # outputs
-    raw: wp.array(dtype=wp.vec4),
-):
-    """Momentum and mass of images to nodes that are active, strained already."""
-    p = wp.tid()
-    world = p / capacity
-    if p - world * capacity < count[world]:
-        x, fill, normal = mirrored(tool, position[p], reach)
-        if fill > 0.0:
-            phase = phases[world, phase_of[p]]
-            m = fill * mass[p]
-            turned = affine[p] - 2.0 * wp.outer(affine[p] * normal, normal)
-            v = 2.0 * tool.pose.velocity[0] - velocity[p]
-            a = wp.mat33()
-            if held[p] != CLAMPED:
-                a = columns_scaled(-m * turned, grid.dx)
-            if dt[world] > 0.0:
-                tau = kirchhoff(phase, volume_ratio[p], wp.vec3(1.0, 1.0, 1.0), wp.vec3())
-                if phase.viscosity > 0.0:
-                    tau += viscous(phase, volume_ratio[p], affine[p])
-                a -= resistance_of(grid, dt[world], fill * volume[p], tau)
-            base = first_node(grid, x)
-            f, wx, wy, wz = weights(grid, x, base)
-            momentum = m * v - a * f
-            for o in range(3):
-                for q in range(3):
-                    for r in range(3):
-                        at = node_at(grid, world, wp.vec3i(base[0] + o, base[1] + q, base[2] + r), table)
-                        if at >= 0:
-                            w = wx[o] * wy[q] * wz[r]
-                            u = w * (momentum + a * wp.vec3(float(o), float(q), float(r)))
-                            wp.atomic_add(raw, at, wp.vec4(u[0], u[1], u[2], w * m))
 
 
 @wp.kernel
@@ -173,8 +113,8 @@ def into_gaps(
         if least > HALF:
             by = down
         elif crowding > HALF:
-            _image, fill, normal = mirrored(tool, x, reach)
-            if fill > 0.0:
+            gap, normal = distance_to(tool, x)
+            if gap < reach:
                 by = wp.min(wp.dot(down, normal), 0.0) * normal
     return by
 
@@ -185,6 +125,8 @@ def find_room(
     grid: Grid,
     capacity: int,
     count: wp.array(dtype=int),
+    phases: wp.array2d(dtype=Phase),
+    phase_of: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
     mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
@@ -204,11 +146,14 @@ def find_room(
         x, j = position[p], volume_ratio[p]
         found = wp.vec2(j, 0.0)
         if held[p] == FREE:
-            there, least, _slope = room_of(grid, world, x, mass[p] / volume[p], table, moving)
+            there, least, slope = room_of(grid, world, x, mass[p] / volume[p], table, moving)
             heard = wp.clamp((least - HALF) / (1.0 - HALF), 0.0, 1.0)
             if within_bore(grid, piston, x):
                 heard = 1.0
-            found = wp.vec2(j + heard * (there - j), least)
+            lacking, margin = there - j, SURFACE * slope
+            if phases[world, phase_of[p]].shear_modulus > 0.0:
+                margin += COMPRESSED
+            found = wp.vec2(j + heard * (lacking - wp.clamp(lacking, -margin, margin)), least)
         room[p] = found
 
 
@@ -249,6 +194,9 @@ def level(
     mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     held: wp.array(dtype=int),
+    elastic_normal: wp.array(dtype=wp.vec3),
+    elastic_shear: wp.array(dtype=wp.vec3),
+    plastic: wp.array(dtype=float),
     shifting: float,
     room: wp.array(dtype=wp.vec2),
     table: wp.array(dtype=int),
@@ -266,8 +214,11 @@ def level(
         mean = mean_of_nodes(grid, world, x, False, table, nodes)
         by = wp.vec3(0.0, 0.0, 0.0)
         change = wp.min(DIFFUSION * dt[world] * phase.wave_speed * grid.inv_dx[0], 1.0) * (mean[0] - j)
-        if held[p] == FREE:
-            change += wp.min(SETTLING * dt[world] * shear_rate(affine[p]), 1.0) * (mean[1] - j)
+        moves = held[p] == FREE
+        if moves:
+            moves = flows(phase, affine[p], elastic_normal[p], elastic_shear[p], dt[world], p, plastic)
+        if moves:
+            change += wp.min(SETTLING * dt[world] * shear_rate(affine[p]), 1.0) * (mean[1] - mean[0])
             density, step = mass[p] / volume[p], shifting * dt[world]
             by = into_gaps(grid, tool, reach, world, density, x, affine[p], step, j, room[p][1], table, moving)
         volume_ratio[p] = j + change
@@ -277,31 +228,28 @@ def level(
 class Held:
     """The body of a scene, and its launches."""
 
-    def __init__(self, scene: Scene, pool: Pool, grid: Grid, slots: int, shifting: float) -> None:
-        """`slots` are the blocks of the grid that can be active; `shifting` is over the strain."""
-        self.scene, self.pool, self.grid, self.shifting = scene, pool, grid, shifting
-        self.reach = REACH * max(grid.dx)
-        self.tool = tool_of(scene, self.reach + scene.spacing)
+    def __init__(
+        self, scene: Scene, pool: Pool, grid: Grid, slots: int, lanes: int, plastic: Any, shifting: float
+    ) -> None:
+        """`slots` and `lanes`: as for Tied; `plastic`: strains, see flow.py; `shifting` is over the strain."""
+        self.scene, self.pool, self.grid, self.plastic, self.shifting = scene, pool, grid, plastic, shifting
+        self.near = NEAR * max(grid.dx)
+        self.tool = tool_of(scene, REACH * max(grid.dx) + scene.spacing)
+        self.tied = Tied(scene, grid, self.tool, slots, lanes)
         with wp.ScopedDevice(scene.device):
             self.nodes = wp.zeros(64 * slots, dtype=wp.vec4)
             self.room = wp.zeros(pool.size, dtype=wp.vec2)
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self._nobody = wp.zeros(1, dtype=int)
 
-    def reflect(self, dt: wp.array, table: wp.array, raw: wp.array) -> None:
-        """Enqueue: add what is seen in the body to momenta and masses of nodes."""
-        pool, launch = self.pool, self.scene.crew.launch
-        matter = [pool.phase, pool.held, pool.position, pool.velocity, pool.affine, pool.mass, pool.volume]
-        body = [self.grid, self.tool, self.reach, pool.capacity, pool.count, dt, self.scene.phases]
-        launch(reflect, pool.size, [*body, *matter, pool.volume_ratio, table], [raw])
-
-    def keep_out(self, table: wp.array, block_of: wp.array, active: wp.array, homes: Any) -> None:
+    def keep_out(self, blocks: Blocks, homes: Any) -> None:
+        """Enqueue: shift what is to be shifted, and keep all in front."""
         pool, outdated = self.pool, self._nobody if homes is None else homes.outdated
         self.scene.crew.launch(
             keep_out,
             pool.size,
             [self.grid, self.tool, pool.capacity, pool.count, pool.held, self.shift],
-            [pool.position, table, block_of, active, outdated, pool.fault],
+            [pool.position, *blocks, outdated, pool.fault],
         )
 
     def level(self, table: wp.array, piston: Any, moving: wp.array) -> None:
@@ -309,13 +257,15 @@ class Held:
         pool, scene, launch = self.pool, self.scene, self.scene.crew.launch
         some = [pool.capacity, pool.count]
         whole = [pool.position, pool.mass, pool.volume, pool.volume_ratio, pool.held, piston, table, moving]
-        launch(find_room, pool.size, [self.grid, *some, *whole], [self.room])
+        launch(find_room, pool.size, [self.grid, *some, scene.phases, pool.phase, *whole], [self.room])
         shares = [pool.position, pool.volume, pool.volume_ratio, self.room, table]
         launch(spread, pool.size, [self.grid, *some, *shares], [self.nodes])
         flow = [scene.dt, scene.phases, pool.phase, pool.position, pool.affine, pool.mass, pool.volume, pool.held]
-        inputs = [self.grid, self.tool, self.reach, *some, *flow, self.shifting, self.room, table, self.nodes, moving]
+        flow += [pool.elastic_normal, pool.elastic_shear, self.plastic]
+        inputs = [self.grid, self.tool, self.near, *some, *flow, self.shifting, self.room, table, self.nodes, moving]
         launch(level, pool.size, inputs, [pool.volume_ratio, self.shift])
 
     def footprint(self) -> dict[str, int]:
         names = ("nodes", "room", "shift")
-        return {f"tool.{name}": getattr(self, name).capacity for name in names} | table_of(self.tool)
+        own = {f"tool.{name}": getattr(self, name).capacity for name in names}
+        return own | self.tied.footprint() | table_of(self.tool)
