@@ -35,12 +35,10 @@ from .grid import Grid, node_at, node_of, turns
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-TIED = wp.constant(0.75)  # distance of nodes that are tied [cells]; from 0.7 to 1 nothing changes
+TIED = wp.constant(0.75)  # distance of nodes that are tied [cells]; with 0.5 the next ones hold a face too loosely
 BEHIND = wp.constant(2.75)  # how far behind the surface nodes have mass [cells]: 1.5 sqrt(3) at most
 REACH = 4.5  # of distances [cells]: nodes about what is in front of those
 LEAST = wp.constant(1.0e-4)  # inertia over mass of a node which moves none but those on the surface
-
-
 Blocks = tuple[wp.array, wp.array, wp.array]  # table, block_of and active of a grid
 
 
@@ -110,7 +108,7 @@ def tie_of(grid: Grid, tool: Tool, edge: float, world: int, node: wp.vec3i, tabl
 
 
 @wp.func
-def in_front(tool: Tool, edge: float, x: wp.vec3, gap: float, normal: wp.vec3):
+def share_in_front(tool: Tool, edge: float, x: wp.vec3, gap: float, normal: wp.vec3):
     """The share of a node's spline that is in front of the surface: what there is of it up to a plane, at the distance
     at which a surface as bent is in the mean, as splines reach by 1/2 of a cell (standard deviation) to all sides."""
     away = x - place_of(tool.pose)
@@ -150,7 +148,7 @@ def give(
         if tie.on == 1 and tie.weight > 0.0:
             m = raw[t][3]
             x = place_of_node(grid, node)
-            open = in_front(tool, edge, x, tie.gap, tie.normal)
+            open = share_in_front(tool, edge, x, tie.gap, tie.normal)
             kick = dt[world] * force_at(force[world], x)
             p = wp.vec3(raw[t][0], raw[t][1], raw[t][2]) + m * (kick - tool.pose.velocity[0])
             along = wp.outer(tie.normal, tie.normal)
@@ -205,7 +203,7 @@ def take(
                 p = wp.vec3(row[0] + given[0], row[1] + given[1], row[2] + given[2]) + row[3] * (kick - u)
                 own = (row[3] + LEAST * given[3]) / mass
                 v = u - kick + wp.inverse(inertia[t] / mass + own * wp.identity(n=3, dtype=float)) * (p / mass)
-                mass /= wp.max(in_front(tool, edge, x, gap, normal) + space[t], 0.5)
+                mass /= wp.max(share_in_front(tool, edge, x, gap, normal) + space[t], 0.5)
                 raw[t] = wp.vec4(mass * v[0], mass * v[1], mass * v[2], mass)
             gain[t] = wp.vec4()
             inertia[t] = wp.mat33()
