@@ -8,6 +8,9 @@ from fluidbench.scenario.stream import COLUMN
 from .grid import cells_of
 
 ACROSS = 6.0  # cells across a bore: with fewer its resistance can be off by more than 10 % (docs/physics)
+THICK = (
+    2.75  # cells of a wall: nodes behind the middle of a thinner one, which matter still reaches, are tied to its back
+)
 
 
 def unpressed(scenario: Scenario, config: Any) -> str | None:
@@ -24,11 +27,17 @@ def unpressed(scenario: Scenario, config: Any) -> str | None:
 
 
 def roughly_pressed(scenario: Scenario, config: Any) -> list[str]:
-    """What a coarse grid makes of a bore."""
-    cells = scenario.narrowest / (config.grid_ratio * scenario.spacing)
-    if scenario.fed_from is None or cells >= ACROSS:
+    """What a coarse grid makes of a bore and of the wall about it."""
+    nozzle, cell = scenario.nozzle, config.grid_ratio * scenario.spacing
+    if scenario.fed_from is None or nozzle is None:
         return []
-    return [
-        f"what it presses through is {cells:.2g} cells wide: below {ACROSS:g} its resistance can be off by more than "
-        "10 %; use numerics.mpm.grid_ratio = 1 or a smaller spacing"
-    ]
+    cells, thick = scenario.narrowest / cell, (nozzle.face - 0.5 * nozzle.diameter) / cell
+    better, told = "; use numerics.mpm.grid_ratio = 1 or a smaller spacing", []
+    if cells < ACROSS:
+        told.append(
+            f"what it presses through is {cells:.2g} cells wide: below {ACROSS:g} its resistance can be off by more "
+            f"than 10 %{better}"
+        )
+    if thick < THICK:
+        told.append(f"the wall about it is {thick:.2g} cells thick: below {THICK:g} pressure leaks through it{better}")
+    return told

@@ -142,10 +142,11 @@ def test_mpm_says_what_it_cannot_press(more, words):
 
 def test_a_coarse_bore_is_told():
     mpm = get_method("mpm")
-    (told,) = mpm.approximates(strand(), mpm.Config(grid_ratio=1.5))
+    told, thin = mpm.approximates(strand(), mpm.Config(grid_ratio=1.5))
     assert told.startswith(
         "what it presses through is 4 cells wide: below 6 its resistance can be off by more than 10 %"
     )
+    assert thin.startswith("the wall about it is 2 cells thick: below 2.75 pressure leaks through it; use numerics")
     assert mpm.approximates(strand(), mpm.Config(grid_ratio=1.0)) == []
     assert mpm.approximates(bead(), mpm.Config(grid_ratio=4.0)) == []
     viscous = strand(material={"density": 1000.0, "viscosity": 2e3})
