@@ -229,6 +229,13 @@ class Scenario(Model):
         sizes = [2.0 * float(min(body.extent)) for body in self.bodies]
         return min(sizes + ([] if self.nozzle is None else [self.nozzle.diameter]))
 
+    @property
+    def wall_thickness(self) -> float:
+        """Of what matter is pressed through, between bore and outside [m]; infinite where there is none."""
+        if self.fed_from is None or self.nozzle is None:
+            return math.inf
+        return self.nozzle.face - 0.5 * self.nozzle.diameter
+
     def _top_speed(self, body: Body) -> float:
         """The fastest initial speed [m/s]: of the body's particles where these are given, or their speeds are by
         expressions, which may vary faster than any grid would show; at the corners of its box otherwise."""

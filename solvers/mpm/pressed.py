@@ -28,10 +28,10 @@ def unpressed(scenario: Scenario, config: Any) -> str | None:
 
 def roughly_pressed(scenario: Scenario, config: Any) -> list[str]:
     """What a coarse grid makes of a bore and of the wall about it."""
-    nozzle, cell = scenario.nozzle, config.grid_ratio * scenario.spacing
-    if scenario.fed_from is None or nozzle is None:
+    if scenario.fed_from is None:
         return []
-    cells, thick = scenario.narrowest / cell, (nozzle.face - 0.5 * nozzle.diameter) / cell
+    cell = config.grid_ratio * scenario.spacing
+    cells, thick = scenario.narrowest / cell, scenario.wall_thickness / cell
     better, told = "; use numerics.mpm.grid_ratio = 1 or a smaller spacing", []
     if cells < ACROSS:
         told.append(
