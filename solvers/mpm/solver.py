@@ -235,20 +235,19 @@ class SolverMPM(TraitsMPM):
             self.empty(self.held.nodes)
             self.held.level(self.table, self.piston, self.moving)
         homes = None if self.by_block is None else self.by_block.homes
-        blocks = self.table, self.block_of, self.active
         if self.gaps is not None:
-            self.gaps.look(*blocks, self.raw, self.moving, self.piston)
+            self.gaps.look(*self.blocks, self.raw, self.moving, self.piston)
         self.gather()
         if self.gaps is not None:
-            self.gaps.go_on(*blocks, homes)
+            self.gaps.go_on(*self.blocks, homes)
         if self.held is not None:
             self.held.keep_out(self.blocks, homes)
 
     def gather(self) -> None:
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
         if self.by_block is not None:
-            blocks = self.table, self.block_of, self.active
-            self.by_block.g2p(self.grid, self.moving, self.shifting, 0.0 if self.held else scene.spacing, *blocks)
+            pitch = 0.0 if self.held else scene.spacing
+            self.by_block.g2p(self.grid, self.moving, self.shifting, pitch, *self.blocks)
             return
         self._launch(
             "g2p",

@@ -12,14 +12,16 @@ the normal n_i; across it, G_ij = w_ij / sum_k w_ik. What particles give to i go
     M_j (v_j - u) = P_j - m_j u + sum_i G_ij^T (P_i - m_i u),   M_j = m_j + sum_i m_i G_ij^2 / s_ij
 
 with s_ij = w_ij d_j / sum_k w_ik d_k along the normal, w_ij / sum_k w_ik across it. These add up to 1, so by Cauchy and
-Schwarz M is no less than G^T m G: no transfer amplifies, no stress, whatever its law, makes energy, and no frequency
-rises, so that the bounds of the step stay what they are. And as sum_i m_i G_ij d_i / d_j is just this M, what shears
-linearly along a no-slip wall is left as it is by transfers. (Masses lumped by w, as would be usual, take up to half of
-the velocity of the last node in every step: a bore then resisted by a fifth too much.)
+Schwarz M is no less than G^T m G: no transfer amplifies, stress does the work of the strain that is read, whatever its
+law, and no frequency rises, so that the bounds of the step stay what they are. (What else acts on volume ratios and
+places, tool.py, has no such proof; and where nodes that lead are behind a wall of the domain, less than two cells from
+the body, the two are not one constraint.) And as sum_i m_i G_ij d_i / d_j is just this M, what shears linearly along a
+no-slip wall is left as it is by transfers. (Masses lumped by w, as would be usual, take up to half of the velocity of
+the last node in every step: a bore then resisted by a fifth too much.)
 
 Images of particles behind the surface, which came before, were gathered from otherwise than they were scattered to:
-that amplified by up to 1.03 a step, and only viscosity held it. Their transpose makes no energy, but the last images
-end in a void, into which the pressure leaks.
+that amplified by up to 1.03 a step, and only viscosity held it. Their transpose does not, but the last images end in
+a void, into which the pressure leaks.
 """
 
 from typing import Any
