@@ -55,9 +55,8 @@ def depth(s, frame):
 
 @pytest.mark.parametrize(("method", "walls"), [*itertools.product(NATIVE, ["stick", "slip"])])
 def test_a_strand_is_pressed_and_none_of_it_enters_the_body(method, walls):
-    clings = (
-        method == "mpm" and walls == "slip"
-    )  # to the face: at 5 times the flow's speed it is packed by an eighth
+    # a strand of MPM clings to a face that slips: at 5 times the speed of flow it would be packed by an eighth
+    clings = method == "mpm" and walls == "slip"
     s = strand(nozzle={"walls": walls}, sound_speed_ratio=20.0 if clings else 5.0)
     sim, frames = Simulation(s, method), []
     outcome = drive(sim, lambda now, _: frames.append(now.frame()))
