@@ -16,7 +16,7 @@ with what it gave to the node, its own momentum and the push of its own stress, 
     v_ip = v_i + g (v_p + (C_p - 4 dt V0 tau / (m_p dx^2)) (x_i - x_p) + dt force - v_i)
 
 The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. Through
-such nodes nothing pushes, drags or strains. Nodes that a wall or the piston acts on are left alone.
+such nodes nothing pushes, drags or strains. Nodes that a wall, the piston or a body acts on are left alone.
 """
 
 import math
@@ -31,11 +31,13 @@ from fluidbench.native.scene import Force, Phase, Scene, force_at
 from fluidbench.native.vector_access import load_vec4
 
 from ..backends import Warp
+from ..tool import Tool, distance_to
 from .grid import Grid, first_node, node_of, node_parts, raw_node, slots_of, turns
 from .homes import on_grid
 from .nodes import follow
 from .particle import ANCHORED, columns_scaled, contained, kirchhoff, resistance_of, viscous, weights
 from .piston import Piston, driven
+from .tied import TIED, place_of_node
 from .walls import in_front, near_any
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -53,6 +55,7 @@ class Known:
     """What is known of gaps."""
 
     noise: float  # by what share a node may lack for want of order
+    tied: float  # distance from a body within which nodes or those next to them are tied [m]
     least: wp.array(dtype=float)  # speed at which the sides of a gap approach, per world [m/s]
     beat: wp.array(dtype=int)  # number of the substep,
     last: wp.array(dtype=int)  # that of the last look,
@@ -125,6 +128,7 @@ def find_gaps(
     raw: wp.array(dtype=wp.vec4),
     phases: wp.array2d(dtype=Phase),
     piston: Piston,
+    tool: Tool,
     row: wp.array(dtype=int),
     # outputs
     known: Known,
@@ -149,8 +153,12 @@ def find_gaps(
             node = corner + wp.vec3i((t & 63) >> 4, (t >> 2) & 3, t & 3)
             if not near_any(grid, node):
                 found = lacking(grid, world, node, mass / full, full, known.least[world], table, raw)
+            place = place_of_node(grid, node)
+            if known.tied > 0.0 and found > known.noise:
+                away, _normal = distance_to(tool, place)
+                if away < known.tied:
+                    found = 0.0
             if piston.on == 1 and found > known.noise:
-                place = grid.origin + wp.cw_mul(wp.vec3(float(node[0]), float(node[1]), float(node[2])), grid.dx)
                 v = wp.vec3(raw[t][0], raw[t][1], raw[t][2]) / mass
                 if wp.length_sq(driven(piston, grid, place, v) - v) > 0.0:
                     found = 0.0
@@ -317,9 +325,12 @@ def go_on(
 class Gaps:
     """What keeping bodies apart allocates, and its launches, which are Warp's whatever the solver's language."""
 
-    def __init__(self, scene: Scene, pool: Pool, grid: Grid, slots: int, lanes: int) -> None:
+    def __init__(self, scene: Scene, pool: Pool, grid: Grid, slots: int, lanes: int, tool: Any) -> None:
+        """`tool` is a body that ties nodes, or None; for `slots` and `lanes` see tied.py."""
         self.scene, self.pool, self.grid, self.lanes = scene, pool, grid, lanes
         known = self.known = Known()
+        known.tied = 0.0 if tool is None else (TIED + 1.0) * max(grid.dx)
+        self.tool = Tool() if tool is None else tool
         known.noise = RANDOM * math.sqrt(scene.spacing**3 * grid.inv_volume)
         with wp.ScopedDevice(scene.device):
             known.least = wp.array([APPROACH * (s.feeding_speed or s.reference_speed) for s in scene.scenarios], float)
@@ -351,7 +362,7 @@ class Gaps:
         pool, scene, row = self.pool, self.scene, self.scene.clock.hours.row
         some, lanes = [self.grid, self.lanes], self.lanes
         nodes = [active, block_of, table, raw]
-        self.launch(find_gaps, lanes, [*some, *nodes, scene.phases, piston, row], [self.known])
+        self.launch(find_gaps, lanes, [*some, *nodes, scene.phases, piston, self.tool, row], [self.known])
         some.append(pool.capacity)
         self.launch(find_members, lanes, [*some, pool.count, pool.held, pool.position, table, row], [self.known])
         matter = [pool.phase, pool.position, pool.velocity, pool.affine, pool.mass, pool.volume]
@@ -368,4 +379,5 @@ class Gaps:
         self.launch(go_on, self.lanes, some, [self.known, *moved, outdated, pool.fault])
 
     def footprint(self) -> dict[str, int]:
-        return {f"gaps.{name}": getattr(self.known, name).capacity for name in Known.vars if name != "noise"}
+        fields = Known.vars.keys() - {"noise", "tied"}
+        return {f"gaps.{name}": getattr(self.known, name).capacity for name in sorted(fields)}

@@ -80,8 +80,9 @@ class SolverMPM(TraitsMPM):
         rate = TURNS * EVERY * config.shifting
         self.settling = Settling(scene, pool, self.grid, self.strains[-1], rate) if settles else None
         meets = any(scenario.emits or len(scenario.bodies) > 1 for scenario in scene.scenarios)
-        told = not (implicit or scene.expands or self.held)  # whose push is whose, and by its mass how full a node is
-        self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes) if meets and told else None
+        told = not (implicit or scene.expands)  # whose push is whose, and by its mass how full a node is
+        tool = None if self.held is None else self.held.tool
+        self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes, tool) if meets and told else None
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)

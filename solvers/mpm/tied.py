@@ -19,6 +19,9 @@ the body, the two are not one constraint.) And as sum_i m_i G_ij d_i / d_j is ju
 no-slip wall is left as it is by transfers. (Masses lumped by w, as would be usual, take up to half of the velocity of
 the last node in every step: a bore then resisted by a fifth too much.)
 
+What slips along a face is free beyond its rim: tied to where it leaves, along a normal that leans, it would be held and
+lifted (a strand rose by a tenth behind the tip). So in front of rims of such walls nodes are not tied.
+
 Images of particles behind the surface, which came before, were gathered from otherwise than they were scattered to:
 that amplified by up to 1.03 a step, and only viscosity held it. Their transpose does not, but the last images end in
 a void, into which the pressure leaks.
@@ -39,6 +42,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 TIED = wp.constant(0.75)  # distance of nodes that are tied [cells]; with 0.5 the next ones hold a face too loosely
 BEHIND = wp.constant(2.75)  # how far behind the surface nodes have mass [cells]: 1.5 sqrt(3) at most
+SLANT = wp.constant(0.1)  # of a normal, from which on it belongs to a rim
 REACH = 4.5  # of distances [cells]: nodes about what is in front of those
 LEAST = wp.constant(1.0e-4)  # inertia over mass of a node which moves none but those on the surface
 Blocks = tuple[wp.array, wp.array, wp.array]  # table, block_of and active of a grid
@@ -60,6 +64,15 @@ class Tie:
 @wp.func
 def place_of_node(grid: Grid, node: wp.vec3i):
     return grid.origin + wp.cw_mul(grid.dx, wp.vec3(float(node[0]), float(node[1]), float(node[2])))
+
+
+@wp.func
+def leaning_out(tool: Tool, x: wp.vec3, normal: wp.vec3):
+    """(the direction out from the body's axis; how far its normal leans that way: -1 in a bore, 0 under a face, 1
+    beside the tip, between these at its rims)"""
+    away = x - place_of(tool.pose)
+    out = wp.normalize(wp.vec3(away[0], away[1], 0.0))
+    return out, wp.dot(out, normal)
 
 
 @wp.func
@@ -95,7 +108,9 @@ def tie_of(grid: Grid, tool: Tool, edge: float, world: int, node: wp.vec3i, tabl
     gap, normal = distance_to(tool, x)
     tie.gap = gap
     tie.normal = normal
-    if tie.gap < TIED * edge and tie.gap > -BEHIND * edge:
+    _out, leaning = leaning_out(tool, x, normal)
+    at_rim = tool.slips == 1 and gap > 0.0 and normal[2] < -SLANT and wp.abs(leaning) > SLANT
+    if tie.gap < TIED * edge and tie.gap > -BEHIND * edge and not at_rim:
         tie.on = 1
         front = wp.max(wp.abs(tie.gap), TIED * edge)
         y = wp.cw_mul(x + (front - tie.gap) * tie.normal - grid.origin, grid.inv_dx)
@@ -113,10 +128,8 @@ def tie_of(grid: Grid, tool: Tool, edge: float, world: int, node: wp.vec3i, tabl
 def share_in_front(tool: Tool, edge: float, x: wp.vec3, gap: float, normal: wp.vec3):
     """The share of a node's spline that is in front of the surface: what there is of it up to a plane, at the distance
     at which a surface as bent is in the mean, as splines reach by 1/2 of a cell (standard deviation) to all sides."""
-    away = x - place_of(tool.pose)
-    out = wp.normalize(wp.vec3(away[0], away[1], 0.0))
-    leaning = wp.dot(out, normal)
-    radius = wp.length(wp.vec2(away[0], away[1])) - gap * leaning  # of the surface there
+    out, leaning = leaning_out(tool, x, normal)
+    radius = wp.dot(out, x - place_of(tool.pose)) - gap * leaning  # of the surface there
     d = gap / edge + 0.125 * leaning * edge / wp.max(radius, edge)
     a = wp.min(wp.abs(d), 1.5)
     beyond = 1.5 - a

@@ -14,7 +14,8 @@ viscosity damps, and that strains it, the more it follows. (Without any, a stiff
 Particles follow streamlines, and those nearest to a wall leave it where it turns: of what flows at s from the wall of a
 bore there is nothing nearer, and past the rim it flows at some 3 s from the face. No strain tells of the gap, and a
 strand let go of the face that should hold it. So here shifting goes both ways, into gaps, too; beside a free surface
-only towards the body. What it takes of volume, J learns as it settles.
+only towards a bore's wall or a face (what has left these is in air: drawn on, it climbed the tip). What it takes of
+volume, J learns as it settles.
 """
 
 from typing import Any
@@ -34,7 +35,7 @@ from .nodes import follow, mean_of_nodes, room_of, tell_nodes
 from .particle import contained, down_the_slope, weights
 from .piston import REACHED, Piston
 from .settling import COMPRESSED, SURFACE
-from .tied import REACH, Blocks, Tied
+from .tied import REACH, SLANT, Blocks, Tied, leaning_out
 
 wp.set_module_options({"enable_backward": False})
 
@@ -104,7 +105,7 @@ def into_gaps(
     moving: wp.array(dtype=wp.vec4),
 ):
     """How far a free particle is shifted into a gap [m]: down the slope of the density where rho J < rho0; where the
-    `least` full of its nodes says that a free surface is near, only towards the body."""
+    `least` full of its nodes says that a free surface is near, only towards a bore's wall or a face."""
     by = wp.vec3(0.0, 0.0, 0.0)
     sums = gathered(grid, world, x, table, moving)
     crowding = sums[0, 3] * volume_ratio / density
@@ -114,7 +115,8 @@ def into_gaps(
             by = down
         elif crowding > HALF:
             gap, normal = distance_to(tool, x)
-            if gap < reach:
+            _out, leaning = leaning_out(tool, x, normal)
+            if gap < reach and leaning < SLANT:
                 by = wp.min(wp.dot(down, normal), 0.0) * normal
     return by
 

@@ -16,7 +16,7 @@ from fluidbench.scenario.bore import Bore
 from fluidbench.scenario.numerics import configure
 from fluidbench.scenario.stream import Stream
 from fluidbench.study.points import varied
-from scenarios.analytic import bore_flow
+from scenarios.analytic import bore_flow, strand_concrete
 
 from ..conftest import NATIVE, bead, drive, scenario
 
@@ -84,6 +84,20 @@ def test_mpm_presses_a_paste(walls):
     assert depth(s, frame).max() < 0.0
     assert KDTree(frame["position"]).query(frame["position"], k=2)[0][:, 1].min() > 0.2 * SPACING
     assert abs(frame["density"] / 1000.0 - 1.0).max() < 0.1
+
+
+def test_what_slips_past_a_face_is_not_lifted_behind_it():
+    """Of concrete that is laid as high as the face no more than a two-hundredth is higher behind the tip, which holds
+    it no longer. Tied to the rim, or drawn into the gap beside it, a fortieth to an eightieth was."""
+    d, gap = strand_concrete.DIAMETER, 0.8
+    s = strand_concrete.strand(1.0, gap, d / 6)
+    s = varied(s.model_dump(mode="json"), {"duration": 3.0 * d / s.toolpath.speed})
+    sim = Simulation(s, "mpm")
+    assert str(drive(sim).verdict) == "completed"
+    frame = sim.frame()
+    behind = (frame["position"][:, 0] < (3.0 - 1.2) * d) & (frame["held"] != CARRIED)
+    higher = frame["position"][behind, 2] > gap * d
+    assert behind.sum() > 500 and higher.mean() < 0.005
 
 
 @pytest.mark.parametrize("higher", [0.0, 0.5])

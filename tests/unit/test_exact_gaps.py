@@ -43,7 +43,7 @@ def gaps_of(sim, rate=0.0):
     return sim.solver.gaps.known.gap.numpy()[: int(sim.solver.active.numpy()[0]) * 64]
 
 
-def apart(gap, speed=SPEED, tilt=0.0, ratio=1.5, material=PASTE):
+def apart(gap, speed=SPEED, tilt=0.0, ratio=1.5, material=PASTE, **table):
     """Two cubes of 12 particles across, `gap` cells between them, the upper one coming down."""
     cell = SIDE / round(SIDE / (ratio * D))
     edge, low = 12 * D, 0.05
@@ -53,7 +53,7 @@ def apart(gap, speed=SPEED, tilt=0.0, ratio=1.5, material=PASTE):
         box([0.2, 0.2, low + edge / 2], [edge] * 3),
         box([0.2, 0.2, upper], [edge] * 3, velocity=velocity),
     ]
-    return started(bodies, ratio, material), cell
+    return started(bodies, ratio, material, **table), cell
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.25, 1.5, 2.0, 2.5])
@@ -213,6 +213,19 @@ def test_it_is_off_where_nothing_can_meet_or_no_one_can_tell():
         numerics={"mpm": {"viscosity": "implicit"}},
     )
     assert Simulation(thick, "mpm").solver.gaps is None
+
+
+def test_near_a_body_that_ties_nodes_none_is_looked_for():
+    """A tip that ends beside the joint hides what is within 1.75 cells of it, one far above and aside nothing."""
+    whole = (gaps_of(apart(1.0)[0]) > 0.0).sum()
+    found = []
+    for start, standoff in (([0.085, 0.2], 0.16), ([0.07, 0.07], 0.3)):
+        nozzle = {"diameter": 0.05, "exit_speed": SPEED, "standoff": standoff, "tip": "flat"}
+        path = {"kind": "line", "start": start, "end": [start[0] + 0.001, start[1]], "speed": 1e-4}
+        sim = apart(1.0, nozzle=nozzle, toolpath=path)[0]
+        found.append((gaps_of(sim) > 0.0).sum())
+    near, far = found
+    assert 0 < near < whole and far == whole
 
 
 def test_what_a_clamp_holds_is_no_side_of_a_gap():
