@@ -153,15 +153,16 @@ def find_gaps(
             node = corner + wp.vec3i((t & 63) >> 4, (t >> 2) & 3, t & 3)
             if not near_any(grid, node):
                 found = lacking(grid, world, node, mass / full, full, known.least[world], table, raw)
-            place = place_of_node(grid, node)
-            if known.tied > 0.0 and found > known.noise:
-                away, _normal = distance_to(tool, place)
-                if away < known.tied:
-                    found = 0.0
-            if piston.on == 1 and found > known.noise:
-                v = wp.vec3(raw[t][0], raw[t][1], raw[t][2]) / mass
-                if wp.length_sq(driven(piston, grid, place, v) - v) > 0.0:
-                    found = 0.0
+            if found > known.noise:
+                place = place_of_node(grid, node)
+                if known.tied > 0.0:
+                    away, _normal = distance_to(tool, place)
+                    if away < known.tied:
+                        found = 0.0
+                if piston.on == 1:
+                    v = wp.vec3(raw[t][0], raw[t][1], raw[t][2]) / mass
+                    if wp.length_sq(driven(piston, grid, place, v) - v) > 0.0:
+                        found = 0.0
         known.gap[t] = wp.clamp((found - known.noise) / SOFT, 0.0, 1.0)
         if found > known.noise:
             known.seen[slot] = known.beat[0]

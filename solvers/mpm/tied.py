@@ -20,7 +20,7 @@ no-slip wall is left as it is by transfers. (Masses lumped by w, as would be usu
 the last node in every step: a bore then resisted by a fifth too much.)
 
 What slips along a face is free beyond its rim: tied to where it leaves, along a normal that leans, it would be held and
-lifted (a strand rose by a tenth behind the tip). So in front of rims of such walls nodes are not tied.
+lifted (a strand rose by a twentieth behind the tip). So in front of rims of such walls nodes are not tied.
 
 Images of particles behind the surface, which came before, were gathered from otherwise than they were scattered to:
 that amplified by up to 1.03 a step, and only viscosity held it. Their transpose does not, but the last images end in
