@@ -141,7 +141,7 @@ def find_room(
     room: wp.array(dtype=wp.vec2),
 ):
     """(the room that a particle is to have, its own if nodes tell of none; how full the least of its nodes is). In a
-    bore there is room to the wall, however few nodes its images fill: a tip may be thinner than they reach."""
+    bore there is room to the wall, however empty nodes are behind it: a tip may be thinner than splines reach."""
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
