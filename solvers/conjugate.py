@@ -24,8 +24,8 @@ class Iterations:
         past: wp.array,
         partial: wp.array,
     ) -> None:
-        """`tolerance` is of the residual over what is solved for [-]; a world's sums are those of partial[begin[world]]
-        and so on, before past[world]."""
+        """`tolerance` is of the residual over v* and what forces give in a step [-]; a world's sums are those of
+        partial[begin[world]] and so on, before past[world]."""
         self.backend, self.kernels = backend, kernels
         self.sums = [begin, past]
         self.partial = partial
@@ -38,7 +38,7 @@ class Iterations:
             self.counted, self.worst = wp.zeros((worlds, 3), dtype=int), wp.zeros(worlds, dtype=float)
 
     def begin_with(self) -> None:
-        """Enqueue: m r.r and m v*.v* are summed up."""
+        """Enqueue: m r.r and m (v*.v* + |dt f|^2) are summed up."""
         self._weigh("weigh_start")
 
     def repeat(self, body: Callable[[], None]) -> None:
@@ -60,8 +60,8 @@ class Iterations:
         self.backend.launch(getattr(self.kernels, name), self.worlds * self.team, inputs, [self.totals, self.going])
 
     def effort(self, world: int = 0) -> dict[str, float]:
-        """Iterations a solve, largest residual over v*, share of solves that did not converge; nothing before the
-        first."""
+        """Iterations a solve, largest residual over v* and dt f, share of solves that did not converge; nothing before
+        the first."""
         solves, iterations, unconverged = (int(n) for n in self.counted.numpy()[world])
         if not solves:
             return {}

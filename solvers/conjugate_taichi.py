@@ -3,7 +3,7 @@
 from fluidbench.method.frame import FREE
 
 from .conjugate_warp import CHUNK, Ending
-from .taichi_bridge import Floats, Ints, Quads, Vectors, struct_of, ti, vec2, vec3, vec4
+from .taichi_bridge import Floats, Forces, Ints, Quads, Vectors, force_at, struct_of, ti, vec2, vec3, vec4
 
 EndingT = struct_of(Ending)
 Twos = ti.types.ndarray(dtype=vec2, ndim=1)
@@ -18,6 +18,9 @@ def residual_of(
     count: Ints,
     held: Ints,
     mass: Floats,
+    dt: Floats,
+    force: Forces,
+    position: Vectors,
     aim: Vectors,
     found: Vectors,
     residual: Vectors,
@@ -37,7 +40,8 @@ def residual_of(
                     r = aim[i] - found[i]
                 residual[i] = r
                 rows[3 * i + 1] = vec4(r[0], r[1], r[2], rows[3 * i + 1][3])
-                sums += mass[i] * vec2(r.norm_sqr(), aim[i].norm_sqr())
+                given = dt[world] * force_at(force, world, position[i])
+                sums += mass[i] * vec2(r.norm_sqr(), aim[i].norm_sqr() + given.norm_sqr())
         partial[chunk] = sums
 
 

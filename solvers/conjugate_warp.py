@@ -8,6 +8,7 @@ import warp as wp
 
 from fluidbench.method.frame import FREE
 from fluidbench.native.crew import BLOCK, index_of, raise_fault
+from fluidbench.native.scene import Force, force_at
 from fluidbench.native.vector_access import in_company, joined, joined_in_block, load_vec4, store_vec4
 
 wp.set_module_options({"enable_backward": False})  # no fast math: what is no number must end the iterations
@@ -21,7 +22,7 @@ AHEAD = wp.constant(8)  # sums that each of them asks for at once: one by one it
 class Ending:
     """When a solve ends."""
 
-    tolerance: float  # of the residual over v*
+    tolerance: float  # of the residual over v* and what forces give in a step
     most: int  # iterations
 
 
@@ -30,7 +31,7 @@ class Totals:
     """Sums over a world, and what follows from them."""
 
     left: float  # m r.r, r being the residual
-    right: float  # m v*.v*
+    right: float  # m (v*.v* + |dt f|^2)
     step: float  # alpha
     turn: float  # beta
     iterations: float  # of this solve
@@ -59,6 +60,9 @@ def residual_of(
     count: wp.array(dtype=int),
     held: wp.array(dtype=int),
     mass: wp.array(dtype=float),
+    dt: wp.array(dtype=float),
+    force: wp.array(dtype=Force),
+    position: wp.array(dtype=wp.vec3),
     aim: wp.array(dtype=wp.vec3),
     image: wp.array(dtype=wp.vec3),
     # outputs
@@ -67,7 +71,8 @@ def residual_of(
     partial: wp.array(dtype=wp.vec2),
     past: wp.array(dtype=int),
 ):
-    """r = v* - K v, the first direction; sums of m r.r and of m v*.v*; where each world's chunks in use end."""
+    """r = v* - K v, the first direction; sums of m r.r and of m (v*.v* + |dt f|^2); where each world's chunks in use
+    end."""
     chunk, first, lanes = chunk_of(index_of(share, wp.tid()))
     world = first / capacity
     if first == world * capacity:
@@ -83,7 +88,8 @@ def residual_of(
             row = load_vec4(rows, 3 * i + 1)
             store_vec4(rows, 3 * i + 1, wp.vec4(r[0], r[1], r[2], row[3]))
             left += mass[i] * wp.dot(r, r)
-            right += mass[i] * wp.dot(aim[i], aim[i])
+            given = dt[world] * force_at(force[world], position[i])
+            right += mass[i] * (wp.dot(aim[i], aim[i]) + wp.dot(given, given))
     put_together(partial, chunk, first, left, right)
 
 
@@ -178,7 +184,8 @@ def summed(partial: wp.array(dtype=wp.vec2), first: int, end: int, member: int, 
 
 @wp.func
 def unsolved(end: Ending, left: float, right: float):
-    """Whether m r.r is too much beside m v*.v*; what is no number is: an iteration hands it on to the velocities."""
+    """Whether m r.r is too much beside m (v*.v* + |dt f|^2); what is no number is: an iteration hands it on to the
+    velocities."""
     return not (left <= end.tolerance * end.tolerance * right)
 
 
@@ -193,7 +200,7 @@ def weigh_start(
     totals: wp.array(dtype=Totals),
     going: wp.array(dtype=int),
 ):
-    """m r.r and m v*.v*, and whether there is anything to solve. `going` was 0."""
+    """Both sums, and whether there is anything to solve. `going` was 0."""
     thread = wp.tid()
     world = thread / team
     found = summed(partial, begin[world], past[world], thread - world * team, team)
@@ -268,8 +275,8 @@ def note(
     counted: wp.array2d(dtype=int),
     worst: wp.array(dtype=float),
 ):
-    """Of each world in which anything moves: solves, iterations, those that did not converge; the largest residual over
-    v*."""
+    """Of each world in which anything moves or is pulled: solves, iterations, those that did not converge; the largest
+    residual over v* and what forces give in a step."""
     world = wp.tid()
     total = totals[world]
     if total.right != 0.0:

@@ -17,9 +17,11 @@ Matter that grows at a rate g (d ln V / dt) moves apart by itself: u is then wha
 resist growth as a bulk viscosity of 5/3 mu.
 
 The first guess is the viscous acceleration of the step before, the mass the preconditioner. Iterations end when the
-root mean square of v* - K v, weighed by mass, is `tolerance` times that of v*; all that decides it stays on the device.
-The velocity that is handed on is v* - (K v - v), by the forces between pairs at the v that was found: these keep
-momentum and angular momentum whatever the residual.
+root mean square of v* - K v, weighed by mass, is `tolerance` times that of v* and of dt f, what the scene's forces f
+give in a step: where matter creeps, forces balance to that share of its weight, which is a velocity to the same share;
+where it rests, v* is rounding, and a share of that would be solved for in vain. All that decides it stays on the
+device. The velocity that is handed on is v* - (K v - v), by the forces between pairs at the v that was found: these
+keep momentum and angular momentum whatever the residual.
 """
 
 from __future__ import annotations
@@ -44,7 +46,7 @@ from .smoothing import drag_weight
 from .tool_map import Radial
 
 Scheme = Literal["auto", "explicit", "implicit"]
-Tolerance = Annotated[float, Field(gt=0, le=1e-2, description="residual of implicit viscosity, over the velocity")]
+Tolerance = Annotated[float, Field(gt=0, le=1e-2, description="residual of implicit viscosity, over velocity and dt g")]
 WORTH = 6.0  # times the substeps that explicit viscosity on pairs may take before implicit is cheaper
 RESOLVED, OVER = 0.1, 5e-3  # of the slowest viscous decay, and of the time across matter, that a step may take
 
@@ -103,9 +105,9 @@ class ImplicitViscosity:
         kept: wp.array | None = None,
         tool: Any = None,
     ) -> None:
-        """`neighbours` hold pairs within the `support` [m]; `tolerance` is of the residual over v* [-]. Where elastic
-        stress is implicit, too, `kept` is the share of each particle's that flow leaves of it; `tool` is a rigid body
-        that drags along, if there is one."""
+        """`neighbours` hold pairs within the `support` [m]; `tolerance` is of the residual over v* and dt f [-]. Where
+        elastic stress is implicit, too, `kept` is the share of each particle's that flow leaves of it; `tool` is a
+        rigid body that drags along, if there is one."""
         self.tooled = tool is not None
         self.scene, self.pool, self.backend, self.neighbours = scene, pool, backend, neighbours
         self.kernels = self.kernels_of(backend.name)
@@ -151,7 +153,7 @@ class ImplicitViscosity:
         if scene.grows:
             self._particles("give_growth", [pool.growth], [self.rows])
             self._over_pairs("growing")
-        inputs = [pool.held, pool.mass, self.aim, self.image]
+        inputs = [pool.held, pool.mass, scene.dt, scene.force, pool.position, self.aim, self.image]
         self._particles("residual_of", inputs, [self.residual, self.rows, self.partial, self.past], self.summing)
         self.iterations.begin_with()
         self.iterations.repeat(self._iterate)

@@ -55,7 +55,8 @@ class Simulation(Session):
         self.target = target
         self.scene = Scene(scenarios, target.device, target.threads if target.backend == DEFAULT_BACKEND else 1)
         self.scenario = self.scene.scenario
-        self.config = configure(solver_class, self.scenario) if config is None else config
+        given = configure(solver_class, self.scenario) if config is None else config
+        self.config = solver_class.decided(self.scenario, given)
         for scenario in self.scene.scenarios:
             if reason := refusal(solver_class, scenario, self.config, target):
                 raise UserError(f"{solver_class.name} cannot run {scenario.name}: {reason}")

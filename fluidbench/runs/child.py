@@ -132,7 +132,7 @@ def _unconverged(solves: dict[str, float]) -> list[str]:
     if not solves.get("unconverged"):
         return []
     share, worst = solves["unconverged"], solves["residual"]
-    return [f"{share:.2g} of its viscous solves ended too early, with residuals up to {worst:.2g} of the velocity"]
+    return [f"{share:.2g} of its viscous solves ended too early, with residuals up to {worst:.2g} of velocity and dt g"]
 
 
 def _numberless(measures: dict[str, float]) -> list[str]:

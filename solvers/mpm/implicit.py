@@ -11,8 +11,9 @@ positive semidefinite: 1 + dt A B is self-adjoint in the inner product p.B q, th
 need a gather, a scatter and one B an iteration. (Stomakhin et al. 2013, ACM TOG 32:102, solve for elasticity so.)
 
 The first guess is that nothing is accelerated; the mass is the preconditioner (in B). Iterations end when the energy of
-the residual is `tolerance`^2 times that of v*. What is handed on is v + B r: the velocity by the forces at the v that
-was found, which keep momentum whatever the residual.
+the residual is `tolerance`^2 times that of v* and of dt f, what the scene's forces f give in a step (viscosity.py says
+why). What is handed on is v + B r: the velocity by the forces at the v that was found, which keep momentum whatever the
+residual.
 
 A rough wall's friction depends on what presses: B is not linear there, and no scenario with one is solved so.
 """
@@ -40,7 +41,7 @@ class GridViscosity:
     OWN: ClassVar[tuple[str, ...]] = ("residual", "answer", "impulse", "search", "image", "partial")
 
     def __init__(self, solver: SolverMPM, tolerance: float) -> None:
-        """`tolerance` is of the residual over v* [-]."""
+        """`tolerance` is of the residual over v* and dt f [-]."""
         self.solver, self.kernels = solver, self.kernels_of(solver)
         scene, slots = solver.scene, len(solver.block_of)
         self.worlds = len(scene.scenarios)
@@ -72,7 +73,7 @@ class GridViscosity:
         inputs = [s.raw, scene.dt, scene.force]
         self._nodes("guess", [s.grid, *self._lanes(), s.block_of, *inputs], [self.residual])
         self._apply()
-        self._sums("start", [s.raw, self.answer], [s.moving, self.image, self.partial])
+        self._sums("start", [*inputs, self.answer], [s.moving, self.image, self.partial])
         s.resist(s.moving, self.image)
         self._nodes("residual_of", [*self._lanes(), self.image], [self.residual])
         self._apply()

@@ -107,18 +107,21 @@ def start(
     many: Ints,
     begin: Ints,
     raw: Quads,
+    dt: Floats,
+    force: Forces,
     answer: Quads,
     moving: Quads,
     image: Quads,
     partial: Twos,
 ):
     for part in range(slots_in_use(active, block_of) * PARTS):
-        total = 0.0
+        block, total = block_of[part // PARTS], 0.0
+        world = block // grid.blocks_per_world
         for t in range(part * PART, (part + 1) * PART):
-            total += raw[t][3] * product(moving[t], moving[t])
+            given = pushed(grid, world, node_at(grid, block - world * grid.blocks_per_world, t % 64), dt[world], force)
+            total += raw[t][3] * (product(moving[t], moving[t]) + product(given, given))
             moving[t] += velocity_of(answer[t])
             image[t] = vec4(0.0)
-        world = block_of[part // PARTS] // grid.blocks_per_world
         partial[sum_of(number, begin, world, part)] = vec2(0.0, total)
 
 

@@ -79,22 +79,27 @@ def start(
     block_of: wp.array(dtype=int),
     ranks: Ranks,
     raw: wp.array(dtype=wp.vec4),
+    dt: wp.array(dtype=float),
+    force: wp.array(dtype=Force),
     answer: wp.array(dtype=wp.vec4),
     # outputs
     moving: wp.array(dtype=wp.vec4),
     image: wp.array(dtype=wp.vec4),
     partial: wp.array(dtype=wp.vec2),
 ):
-    """Sums of m v*.v*; then the velocity of the guess in place of v*."""
+    """Sums of m (v*.v* + |dt f|^2); then the velocity of the guess in place of v*."""
     part, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0], block_of.shape[0]) * PARTS)
     while part < end:
-        total = float(0.0)
+        slot, total = part / PARTS, float(0.0)
+        world = world_of(grid, block_of, slot)
         for k in range(PART):
             t = part * PART + k
-            total += raw[t][3] * product(moving[t], moving[t])
+            node = node_of(grid, block_of[slot] - world * grid.blocks_per_world, t % 64)
+            given = pushed(grid, node, dt[world], force[world])
+            total += raw[t][3] * (product(moving[t], moving[t]) + product(given, given))
             moving[t] = moved_by(moving[t], answer[t])
             image[t] = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        partial[sum_of(ranks, world_of(grid, block_of, part / PARTS), part)] = wp.vec2(0.0, total)
+        partial[sum_of(ranks, world, part)] = wp.vec2(0.0, total)
         part += step
 
 

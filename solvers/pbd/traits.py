@@ -12,7 +12,7 @@ from fluidbench.scenario import Scenario
 from ..backends import LACKING
 from ..neighbours import crowded
 from ..search import FAULT_NEIGHBOURS
-from .bounds import bounds_of
+from .bounds import bounds_of, iterations_of
 from .config import ConfigPBD
 
 
@@ -33,6 +33,12 @@ class TraitsPBD(Solver):
 
     typical_rate, typical_bytes = 1.5e5, 1300.0
     bounded = False
+
+    @classmethod
+    def decided(cls, scenario: Scenario, config: Any) -> Any:
+        if config.iterations is not None:
+            return config
+        return config.model_copy(update={"iterations": iterations_of(scenario, config)})
 
     @classmethod
     def economies(cls, scenario: Scenario, config: Any) -> list[Economy]:

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from fluidbench.method.timestep import Bound, damped_limit, lost_speed, plan
 from fluidbench.registry import get_method
+from fluidbench.scenario.numerics import configure
 from solvers.lattice import hourglass_limit
 
 from ..conftest import scenario
@@ -101,15 +102,44 @@ def test_pbd_by_hand():
 
 
 def test_pbd_pushes_as_hard_as_stress_pulls():
-    """0.1 rho (d / dt)^2 is a yield stress, 100 rho (d / dt)^2 the viscous stress mu U / 8 d; foam that has grown is
-    lighter."""
+    """n iterations, of which more than 5 count as 5, push against a yield stress of 0.02 n rho (d / dt)^2 and a viscous
+    stress mu U / 8 d of 20 n rho (d / dt)^2; foam that has grown is lighter."""
     paste = {"youngs_modulus": 1e6, "yield_stress": 500.0}
-    assert bounds("pbd", material=paste)["yield push"] == pytest.approx(D * math.sqrt(0.1 * 1000.0 / 500.0))
+    for given, n in ((1, 1), (2, 2), (5, 5), (12, 5), (None, 5)):
+        got = bounds("pbd", numerics={"iterations": given}, material=paste)
+        assert got["yield push"] == pytest.approx(D * math.sqrt(0.02 * n * 1000.0 / 500.0))
     for other in ({}, {"yield_stress": 1e9}, {"yield_stress": 0.0}, {"yield_stress": None, "relaxation_time": 0.1}):
         assert "yield push" not in bounds("pbd", material={"youngs_modulus": 1e6, **other})
     u = scenario(material={"density": 1000.0}, spacing=D).reference_speed
-    got = bounds("pbd", material={"viscosity": 50.0})
-    assert got["viscous push"] == pytest.approx(D * math.sqrt(100.0 * 1000.0 / (50.0 * u / (8.0 * D))))
+    for n in (1, 5):
+        got = bounds("pbd", numerics={"iterations": n}, material={"viscosity": 50.0})
+        assert got["viscous push"] == pytest.approx(D * math.sqrt(20.0 * n * 1000.0 / (50.0 * u / (8.0 * D))))
+
+
+def pbd_iterations(**table):
+    s = scenario(spacing=D, duration=2.0, **table)
+    return configure(get_method("pbd"), s).iterations
+
+
+@pytest.mark.parametrize(("ratio", "n"), [(0.01, 2), (0.99, 2), (1.01, 3), (1.99, 4), (2.01, 5), (50.0, 5)])
+def test_pbd_goes_through_its_constraints_as_often_as_matter_is_stiff(ratio, n):
+    """n rho (d / dt)^2 is twice E + mu / dt at least, and n from 2 to 5; `ratio` is (E dt^2 + mu dt) / rho d^2."""
+    speed = scenario(material={"density": 500.0}, spacing=D).reference_speed
+    dt = 0.125 * D / speed  # less than a tick, and than free fall allows
+    elastic = ratio * 500.0 * (D / dt) ** 2
+    soft = {"density": 500.0, "youngs_modulus": elastic, "yield_stress": 1e-3 * elastic}
+    assert pbd_iterations(material=soft) == n
+    assert pbd_iterations(material=soft, numerics={"pbd": {"iterations": 7}}) == 7
+    assert pbd_iterations(material={"density": 500.0}) == 2
+
+
+def test_pbd_goes_by_the_stiffest_that_matter_becomes():
+    cure = {"delay": 0.5, "youngs_modulus": 1e6, "yield_stress": 500.0}
+    curing = {"density": 1000.0, "youngs_modulus": 10.0, "yield_stress": 0.01}
+    assert pbd_iterations(material=curing) == 2
+    assert pbd_iterations(material=curing | {"cure": cure}) == 5
+    assert pbd_iterations(material={"density": 1000.0, "viscosity": 1e-3}) == 2
+    assert pbd_iterations(material={"density": 1000.0, "viscosity": 1e3}) == 5
 
 
 def test_formulas_name_the_numbers_that_were_used():

@@ -124,6 +124,15 @@ def test_a_solve_keeps_momentum_and_its_turn(viscosity):
     assert np.abs(turned).max() <= 2e-6 * np.abs(m * np.cross(arm, before)).sum()
 
 
+def test_a_residual_is_measured_by_velocity_and_weight():
+    """m (v*.v* + (g dt)^2), and what falls from rest has v* = g dt."""
+    simulation = block(adrift(1e4).model_copy(update={"gravity": (0.0, 0.0, -9.81)}))
+    solved(simulation, 0 * noise(simulation), 1e-2)
+    mass = simulation.frame()["mass"].astype(float).sum()
+    right = simulation.solver.viscosity.iterations.totals.numpy()[0]["right"]
+    assert right == pytest.approx(mass * 2.0 * 0.0981**2, rel=1e-4)
+
+
 def test_a_rotation_feels_no_drag():
     simulation = block(adrift(1e6))
     x = simulation.frame()["position"].astype(float)

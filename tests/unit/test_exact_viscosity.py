@@ -141,6 +141,22 @@ def test_a_solve_keeps_momentum(method, viscosity, rounding):
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_a_residual_is_measured_by_velocity_and_weight(method):
+    """m (v*.v* + (g dt)^2): where g dt is 1e5 times as much, a rounding of velocity is left as it is."""
+    heavy = made(jitter=0.2).model_copy(update={"gravity": (0.0, 0.0, -0.1)})
+    for scenario, weight in ((heavy, 1e-3), (made(jitter=0.2), 0.0)):
+        simulation = block(method, scenario, tolerance=1e-4)
+        before = 1e-8 * noise(simulation)
+        after, went = solved(simulation, before, 1e-2)
+        total, m = simulation.solver.viscosity.iterations.totals.numpy()[0], simulation.frame()["mass"].astype(float)
+        wanted = (m * ((before.astype(float) ** 2).sum(axis=1) + weight**2)).sum()
+        assert total["right"] == pytest.approx(wanted, rel=1e-5)
+        assert went["residual"] == pytest.approx(math.sqrt(total["left"] / total["right"]), rel=1e-4)
+        assert (went["iterations"] == 0.0) == (weight > 0.0) and went["unconverged"] == 0.0
+        assert np.abs(after.sum(axis=0) - before.sum(axis=0)).max() <= 1e-6 * np.abs(before).sum()
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_a_drop_in_free_flight_keeps_its_turn(method):
     scenario = adrift(1e6, jitter=0.2)
     simulation = block(method, scenario, tolerance=1e-2)
