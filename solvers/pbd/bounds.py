@@ -44,8 +44,8 @@ def bounds_of(scenario: Scenario, config: ConfigPBD, speed: float) -> list[Bound
 
 
 def iterations_of(scenario: Scenario, config: ConfigPBD) -> int:
-    """n density iterations convey a stiffness of about n rho (d / dt)^2 (references.md, I), which should be twice that of
-    matter over a substep, E + mu / dt, at whatever age of it: then it keeps its volume rather than its shape."""
+    """n density iterations convey a stiffness of about n rho (d / dt)^2 (references.md, I), which should be twice that
+    of matter over a substep, E + mu / dt, at whatever age of it: then it keeps its volume rather than its shape."""
     ratio = 0.0
     for m in scenario.aged[1]:
         made = scenario.made_of(m)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fluidbench.native.simulation import Simulation
-from solvers.mpm.gaps import APPROACH, EVERY, RANDOM, SOFT
+from solvers.mpm.gap_nodes import APPROACH, EVERY, RANDOM, SOFT
 
 from ..conftest import PERIODIC, bead, scenario
 
