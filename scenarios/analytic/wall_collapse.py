@@ -125,7 +125,7 @@ CASE = Case(
     "worst share of layers beyond what lies between experiment and computation",
     spacing=HEIGHT / 6,
     tolerance=0.06,
-    causes={"pbd": "13 layers of LM30, printed ten or five times faster, where 12 are computed; at H / 8 it bears 12"},
+    causes={"pbd": "13 layers of LM30, printed 10 times faster (12 computed); 12 with 10 iterations, and at H / 8"},
     scenarios=scenarios,
     evaluate=evaluate,
     quick=HEIGHT / 4,
