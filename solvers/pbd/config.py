@@ -13,7 +13,7 @@ from ..viscosity import Tolerance
 class ConfigPBD(Config):
     support_ratio: Annotated[float, Field(ge=2.0, le=3.5)] = Field(2.4, description="kernel radius H over spacing")
     iterations: Annotated[int, Field(ge=1, le=200)] | None = Field(
-        None, description="density iterations per substep; default 2 to 5, the stiffer matter is over a substep"
+        None, description="density iterations per substep; else 2 to 5, more the stiffer matter is over one"
     )
     advance: Annotated[float, Field(gt=0, le=1)] = Field(0.125, description="accuracy: spacings moved per substep")
     relaxation: Annotated[float, Field(gt=0)] = Field(0.2, description="constraint force mixing epsilon")
