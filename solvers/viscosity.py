@@ -18,7 +18,7 @@ resist growth as a bulk viscosity of 5/3 mu.
 
 The first guess is the viscous acceleration of the step before, the mass the preconditioner. Iterations end when the
 root mean square of v* - K v, weighed by mass, is `tolerance` times that of v* and of dt f, what the scene's forces f
-give in a step: where matter creeps, forces balance to that share of its weight, which is a velocity to the same share;
+give in a step: where matter creeps, forces balance to that share of its weight, which is a velocity to a like share;
 where it rests, v* is rounding, and a share of that would be solved for in vain. All that decides it stays on the
 device. The velocity that is handed on is v* - (K v - v), by the forces between pairs at the v that was found: these
 keep momentum and angular momentum whatever the residual.
