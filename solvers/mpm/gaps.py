@@ -35,37 +35,13 @@ from .tied import TIED
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 
-@wp.kernel
-def find_members(
-    share: wp.vec3i,
-    grid: Grid,
-    lanes: int,
-    capacity: int,
-    count: wp.array(dtype=int),
-    held: wp.array(dtype=int),
-    position: wp.array(dtype=wp.vec3),
-    table: wp.array(dtype=int),
-    row: wp.array(dtype=int),
-    # outputs
-    known: Known,
-):
-    """Who has nodes in blocks with gaps, where that is due."""
-    lane = index_of(share, wp.tid())
-    p, end, step = turns(lane, lanes, position.shape[0])
-    if not due(known, row):
-        end = 0
-    look = known.beat[0]
-    while p < end:
-        world = p / capacity
-        if p - world * capacity < count[world] and held[p] == FREE:
-            bx, by, bz, _lx, _ly, _lz = node_parts(grid, first_node(grid, position[p]))
-            s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
-            low = wp.max(wp.max(with_gaps(known, s0, look), with_gaps(known, s1, look)), with_gaps(known, s2, look))
-            high = wp.max(wp.max(with_gaps(known, s4, look), with_gaps(known, s5, look)), with_gaps(known, s6, look))
-            both = wp.max(with_gaps(known, s3, look), with_gaps(known, s7, look))
-            if wp.max(wp.max(low, high), both) >= 0:
-                known.members[drawn(known.number, 0)] = p
-        p += step
+@wp.func
+def has_gaps(known: Known, look: int, s0: int, s1: int, s2: int, s3: int, s4: int, s5: int, s6: int, s7: int):
+    """Whether any of eight blocks has a node in a gap."""
+    low = wp.max(wp.max(with_gaps(known, s0, look), with_gaps(known, s1, look)), with_gaps(known, s2, look))
+    high = wp.max(wp.max(with_gaps(known, s4, look), with_gaps(known, s5, look)), with_gaps(known, s6, look))
+    both = wp.max(with_gaps(known, s3, look), with_gaps(known, s7, look))
+    return wp.max(wp.max(low, high), both) >= 0
 
 
 @wp.kernel
@@ -74,6 +50,8 @@ def keep_own(
     grid: Grid,
     lanes: int,
     capacity: int,
+    count: wp.array(dtype=int),
+    held: wp.array(dtype=int),
     dt: wp.array(dtype=float),
     force: wp.array(dtype=Force),
     phases: wp.array2d(dtype=Phase),
@@ -92,56 +70,66 @@ def keep_own(
     # outputs
     known: Known,
 ):
-    """By what the members will be faster than what they gather; after strain, before motion."""
-    t, end, step = turns(index_of(share, wp.tid()), lanes, known.number[0])
-    look = known.last[0]
-    if due(known, row):
-        look = known.beat[0]
+    """By what who has nodes in blocks with gaps will be faster than what it gathers; after strain, before motion. Who
+    that is is found among all where gaps were looked for, and known from then on."""
+    anew = due(known, row)
+    many, look = int(known.number[0]), int(known.last[0])
+    if anew:
+        many, look = position.shape[0], int(known.beat[0])
+    t, end, step = turns(index_of(share, wp.tid()), lanes, many)
     while t < end:
-        p = known.members[t]
+        p = int(t)
+        if not anew:
+            p = known.members[t]
         world = p / capacity
-        base = first_node(grid, position[p])
-        f, wx, wy, wz = weights(grid, position[p], base)
-        bx, by, bz, lx, ly, lz = node_parts(grid, base)
-        s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
-        s0, s1, s2, s3 = (
-            with_gaps(known, s0, look),
-            with_gaps(known, s1, look),
-            with_gaps(known, s2, look),
-            with_gaps(known, s3, look),
-        )
-        s4, s5, s6, s7 = (
-            with_gaps(known, s4, look),
-            with_gaps(known, s5, look),
-            with_gaps(known, s6, look),
-            with_gaps(known, s7, look),
-        )
-        phase = phases[world, phase_of[p]]
-        tau = kirchhoff(phase, volume_ratio[p], elastic_normal[p], elastic_shear[p])
-        if phase.viscosity > 0.0:
-            tau += viscous(phase, volume_ratio[p], affine[p])
-        a = columns_scaled(affine[p], grid.dx) - resistance_of(grid, dt[world], volume[p], tau) / mass[p]
-        v = velocity[p] + dt[world] * force_at(force[world], position[p])
-        more, turn = wp.vec3(0.0, 0.0, 0.0), wp.mat33(0.0)
-        for o in range(3):
-            for q in range(3):
-                for r in range(3):
-                    t0 = wp.where(bz[r] == bz[0], s0, s1)
-                    t1 = wp.where(bz[r] == bz[0], s2, s3)
-                    t2 = wp.where(bz[r] == bz[0], s4, s5)
-                    t3 = wp.where(bz[r] == bz[0], s6, s7)
-                    near = wp.where(by[q] == by[0], t0, t1)
-                    far = wp.where(by[q] == by[0], t2, t3)
-                    slot = wp.where(bx[o] == bx[0], near, far)
-                    at = wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r]
-                    mean = load_vec4(moving, at)
-                    part = wp.where(slot >= 0, wx[o] * wy[q] * wz[r] * known.gap[at], 0.0)
-                    off = wp.vec3(float(o), float(q), float(r)) - f
-                    u = part * (v + a * off - wp.vec3(mean[0], mean[1], mean[2]))
-                    more += u
-                    turn += wp.outer(u, off)
-        known.faster[t] = more
-        known.bent[t] = columns_scaled(turn, 4.0 * grid.inv_dx)
+        if not anew or (p - world * capacity < count[world] and held[p] == FREE):
+            base = first_node(grid, position[p])
+            bx, by, bz, lx, ly, lz = node_parts(grid, base)
+            s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
+            if not anew or has_gaps(known, look, s0, s1, s2, s3, s4, s5, s6, s7):
+                s0, s1, s2, s3 = (
+                    with_gaps(known, s0, look),
+                    with_gaps(known, s1, look),
+                    with_gaps(known, s2, look),
+                    with_gaps(known, s3, look),
+                )
+                s4, s5, s6, s7 = (
+                    with_gaps(known, s4, look),
+                    with_gaps(known, s5, look),
+                    with_gaps(known, s6, look),
+                    with_gaps(known, s7, look),
+                )
+                f, wx, wy, wz = weights(grid, position[p], base)
+                phase = phases[world, phase_of[p]]
+                tau = kirchhoff(phase, volume_ratio[p], elastic_normal[p], elastic_shear[p])
+                if phase.viscosity > 0.0:
+                    tau += viscous(phase, volume_ratio[p], affine[p])
+                a = columns_scaled(affine[p], grid.dx) - resistance_of(grid, dt[world], volume[p], tau) / mass[p]
+                v = velocity[p] + dt[world] * force_at(force[world], position[p])
+                more, turn = wp.vec3(0.0, 0.0, 0.0), wp.mat33(0.0)
+                for o in range(3):
+                    for q in range(3):
+                        for r in range(3):
+                            t0 = wp.where(bz[r] == bz[0], s0, s1)
+                            t1 = wp.where(bz[r] == bz[0], s2, s3)
+                            t2 = wp.where(bz[r] == bz[0], s4, s5)
+                            t3 = wp.where(bz[r] == bz[0], s6, s7)
+                            near = wp.where(by[q] == by[0], t0, t1)
+                            far = wp.where(by[q] == by[0], t2, t3)
+                            slot = wp.where(bx[o] == bx[0], near, far)
+                            at = wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r]
+                            mean = load_vec4(moving, at)
+                            part = wp.where(slot >= 0, wx[o] * wy[q] * wz[r] * known.gap[at], 0.0)
+                            off = wp.vec3(float(o), float(q), float(r)) - f
+                            u = part * (v + a * off - wp.vec3(mean[0], mean[1], mean[2]))
+                            more += u
+                            turn += wp.outer(u, off)
+                member = int(t)
+                if anew:
+                    member = drawn(known.number, 0)
+                    known.members[member] = p
+                known.faster[member] = more
+                known.bent[member] = columns_scaled(turn, 4.0 * grid.inv_dx)
         t += step
 
 
@@ -226,10 +214,9 @@ class Gaps:
         nodes = [active, block_of, table, raw]
         self.launch(find_gaps, lanes, [*some, *nodes, scene.phases, piston, self.tool, row], [self.known])
         some.append(pool.capacity)
-        self.launch(find_members, lanes, [*some, pool.count, pool.held, pool.position, table, row], [self.known])
         matter = [pool.phase, pool.position, pool.velocity, pool.affine, pool.mass, pool.volume]
         matter += [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear]
-        given = [scene.dt, scene.force, scene.phases, *matter, table, moving, row]
+        given = [pool.count, pool.held, scene.dt, scene.force, scene.phases, *matter, table, moving, row]
         self.launch(keep_own, lanes, [*some, *given], [self.known])
 
     def go_on(self, table: wp.array, block_of: wp.array, active: wp.array, homes: Any) -> None:
