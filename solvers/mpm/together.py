@@ -1,8 +1,9 @@
 """The scatter of MPM on a GPU: the threads of a warp work out a particle each, then add up all 32, a node each.
 
-Particles lie in the order of their cells: those of a warp that share their 27 nodes follow each other. Lanes 0 to 26
-own one of the nodes, go through the particles one after the other, and write once for each run of them: no shuffles, a
-few atomic additions of 16 bytes, and every step but the first is out of the nearest memory.
+Particles lie in the order of their cells, or nearly: those of a warp share few sets of 27 nodes. Each puts what it
+gives beside that of those with the same nodes; then lanes 0 to 26 own a node each, go through these one after the
+other, and write once for each set: few atomic additions, of 16 bytes, and all but the first step is out of the nearest
+memory.
 """
 
 import warp as wp
@@ -24,31 +25,38 @@ def stencil(bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i, lx: wp.vec3i, ly: wp.vec3i
 @wp.func_native(
     snippet="""
 #if defined(__CUDA_ARCH__)
-    // a particle: momentum and mass, three columns, weights along x, y and z beside the code, slots
+    // a particle: momentum and mass, three columns, weights along x, y and z beside lowest node and code, slots
     __shared__ float4 store[128 * 9];
     const int lane = threadIdx.x & 31;
-    float4* const own = store + threadIdx.x * 9;
+    const unsigned same = __match_any_sync(0xffffffffu, lowest);
+    unsigned heads = 0;
+    int rank = 0;
+    for (unsigned left = 0xffffffffu, begin = 0; left;) {
+        const unsigned set = __shfl_sync(0xffffffffu, same, __ffs(left) - 1);
+        if (set >> lane & 1) rank = begin + __popc(set & ((1u << lane) - 1u));
+        heads |= 1u << begin;
+        begin += __popc(set);
+        left &= ~set;
+    }
+    float4* const all = store + (threadIdx.x & ~31) * 9;
+    float4* const own = all + rank * 9;
     own[0] = make_float4(momentum[0], momentum[1], momentum[2], mass);
     for (int c = 0; c < 3; ++c) own[1 + c] = make_float4(a.data[0][c], a.data[1][c], a.data[2][c], 0.0f);
-    own[4] = make_float4(wx[0], wx[1], wx[2], 0.0f);
+    own[4] = make_float4(wx[0], wx[1], wx[2], __int_as_float(lowest));
     own[5] = make_float4(wy[0], wy[1], wy[2], __int_as_float(code));
     own[6] = make_float4(wz[0], wz[1], wz[2], 0.0f);
     own[7] = make_float4(__int_as_float(s0), __int_as_float(s1), __int_as_float(s2), __int_as_float(s3));
     own[8] = make_float4(__int_as_float(s4), __int_as_float(s5), __int_as_float(s6), __int_as_float(s7));
-    const int before = __shfl_up_sync(0xffffffffu, lowest, 1);
-    const unsigned heads = __ballot_sync(0xffffffffu, lane == 0 || before != lowest);
-    const unsigned here = __ballot_sync(0xffffffffu, lowest >= 0);
     __syncwarp();
     const int o = lane / 9, q = (lane / 3) % 3, r = lane % 3;
     const float fo = o, fq = q, fr = r;
-    const float4* const all = store + (threadIdx.x & ~31) * 9;
     for (int first = 0; first < 32;) {
         const unsigned later = first == 31 ? 0u : heads >> (first + 1);
         const int end = later ? first + __ffs(later) : 32;
-        if (lane < 27 && (here >> first & 1)) {
+        const int* const place = (const int*)(all + first * 9);
+        if (lane < 27 && place[19] >= 0) {
             float x = 0.0f, y = 0.0f, z = 0.0f, w = 0.0f;
             const float4* it = all + first * 9;
-            const int* const place = (const int*)it;
 #pragma unroll 4
             for (int p = first; p < end; ++p, it += 9) {
                 const float* const words = (const float*)it;
