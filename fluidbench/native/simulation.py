@@ -79,6 +79,7 @@ class Simulation(Session):
         self.done = 0
         self.unseen = True  # whether somebody else may have changed the particles since the last audit
         self.aged = 0  # ticks that this process has run
+        self._disordered = 0.0  # since a march sorted particles [s]
         self._planned: tuple[float, float, Plan] | None = None  # speed, end of its validity [s], plan
         self.posted: Letter | None = None  # a reading on its way from a GPU
         self.heard = Vital(self.speed, 0.0, 0.0, None)
@@ -115,6 +116,7 @@ class Simulation(Session):
     def begin(self) -> Vital:
         self.scene.clock.show(0)
         self._age(self._expect())
+        self.sorting.sort()
         self._refresh()
         return self.look()
 
@@ -136,7 +138,7 @@ class Simulation(Session):
         """One tick: feed, plan, and run its substeps. A GPU is never idle for it, but where matter gives birth."""
         if not self.scene.device.is_cpu and self.done % LOOK_TICKS == 0:
             self._exchange()
-        if self.done % sorting.EVERY == 0:
+        if self.done % sorting.EVERY == 0 and self.done > 0:
             self.sorting.sort()
         self.scene.clock.show(self.done)
         feeding = self._expect()
@@ -183,7 +185,9 @@ class Simulation(Session):
         self.pool.stale = False
         if on_cpu:  # where replay is free
             start = self.scene.crew.recorded(first, lambda: self._start_tick(*first))
-            self.scene.crew.replay([(start, 1), (self.scene.crew.recorded(1, self._substep), steps.substeps)])
+            self.scene.crew.replay(
+                [(start, 1), (self.scene.crew.recorded(1, lambda: self._substeps(1)), steps.substeps)]
+            )
         else:
             whole = *first, steps.substeps
             self.scene.crew.replay([(self.scene.crew.recorded(whole, lambda: self._whole_tick(*whole)), 1)])
@@ -207,8 +211,7 @@ class Simulation(Session):
 
     def _whole_tick(self, audited: bool, feeding: bool, stale: bool, turn: int, substeps: int) -> None:
         self._start_tick(audited, feeding, stale, turn)
-        for _ in range(substeps):
-            self._substep()
+        self._substeps(substeps)
 
     def _age(self, feeding: bool) -> None:
         """What happens to material whatever the method, at the start of a tick."""
@@ -245,6 +248,10 @@ class Simulation(Session):
 
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
+        if self._disordered >= sorting.EVERY * self.tick:
+            self.sorting.sort()
+            self._disordered = 0.0
+        self._disordered += substeps * dt
         self._audit()
         self._refresh()
         self.scene.set_dt(dt)
@@ -317,16 +324,18 @@ class Simulation(Session):
     def capacity(self) -> int:
         return self.pool.size
 
-    def _substep(self) -> None:
-        """Everything of one substep, as it is captured."""
+    def _substeps(self, number: int) -> None:
+        """Everything of so many substeps, as it is captured."""
+        after = [part.substep for part in (self.scene.carriage, self.contact) if part is not None]
         with CountedLaunches() as counted:
-            self.solver.substep()
-            if self.scene.carriage is not None:
-                self.scene.carriage.substep()
-            if self.contact is not None:
-                self.contact.substep()
+            if not after:
+                self.solver.substeps(number)
+            else:
+                for _ in range(number):
+                    for part in (self.solver.substep, *after):
+                        part()
         if self.scene.crew.leading:
-            self.substep_launches = counted.count
+            self.substep_launches = math.ceil(counted.count / number)
 
     def _run(self, substeps: int) -> None:
         """Replay `substeps` substeps: one graph a substep on the CPU, one for all on CUDA."""
@@ -334,14 +343,13 @@ class Simulation(Session):
             self._launch(substeps)
             return
         each = 1 if self.scene.device.is_cpu else substeps
-        graphs = self.scene.crew.recorded(each, lambda: [self._substep() for _ in range(each)])
+        graphs = self.scene.crew.recorded(each, lambda: self._substeps(each))
         self.scene.crew.replay([(graphs, substeps // each)])
 
     def _launch(self, substeps: int) -> None:
         """Launch `substeps` substeps one by one, between those of Warp that came before and come after."""
         self._wait()
-        for _ in range(substeps):
-            self._substep()
+        self._substeps(substeps)
         self._wait()
 
     def _wait(self) -> None:

@@ -25,6 +25,7 @@ class Solver(Method):
     faults: ClassVar[dict[int, str]] = {}
     arranges: int = 0  # ticks from one call of `arrange` to the next; 0 for never
     turns: int = 1  # calls of `arrange` until it does the same again
+    sort_bits: int = 64  # of its sort keys, from the lowest on, that tell any two apart
     makes_room: bool = False  # whether it must be told when particles were put where others may be
     backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
 
@@ -57,6 +58,11 @@ class Solver(Method):
         graph, once for each thread that shares the work. A method that `shares_threads` launches through
         `scene.crew.launch` alone; any other may use `wp.launch`.
         """
+
+    def substeps(self, number: int) -> None:
+        """Enqueue so many of them, with nothing in between; a method may have a shorter way than one by one."""
+        for _ in range(number):
+            self.substep()
 
     def prepare(self) -> None:
         """Compile the kernels; timed apart from the run."""

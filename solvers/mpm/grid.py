@@ -219,6 +219,38 @@ def slots_of(table: wp.array(dtype=int), start: int, bx: wp.vec3i, by: wp.vec3i,
     )
 
 
+@wp.func_native(
+    snippet="""
+#if defined(__CUDA_ARCH__)
+    const volatile wp::int32* const now = &table.data[block];
+    wp::int32 slot;
+    do slot = *now; while (slot < 0);
+    return slot - 1;
+#else
+    return table.data[block] - 1;
+#endif
+"""
+)
+def slot_drawn(table: wp.array(dtype=int), block: int) -> int:
+    """Slot of a block, -1 where there is none, once a thread that has claimed it in this launch has drawn its slot."""
+    ...
+
+
+@wp.func
+def slots_drawn(table: wp.array(dtype=int), start: int, bx: wp.vec3i, by: wp.vec3i, bz: wp.vec3i):
+    """The same of blocks that threads of this launch activate."""
+    return (
+        slot_drawn(table, start + bx[0] + by[0] + bz[0]),
+        slot_drawn(table, start + bx[0] + by[0] + bz[2]),
+        slot_drawn(table, start + bx[0] + by[2] + bz[0]),
+        slot_drawn(table, start + bx[0] + by[2] + bz[2]),
+        slot_drawn(table, start + bx[2] + by[0] + bz[0]),
+        slot_drawn(table, start + bx[2] + by[0] + bz[2]),
+        slot_drawn(table, start + bx[2] + by[2] + bz[0]),
+        slot_drawn(table, start + bx[2] + by[2] + bz[2]),
+    )
+
+
 @wp.kernel
 def reset_blocks(table: wp.array(dtype=int), block_of: wp.array(dtype=int), active: wp.array(dtype=int), lanes: int):
     """Forget all blocks."""

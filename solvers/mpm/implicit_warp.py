@@ -14,10 +14,10 @@ from fluidbench.native.vector_access import in_company
 
 from ..conjugate_warp import Totals, note, weigh_start, weigh_step, weigh_turn
 from .grid import Grid, first_node, node_of, node_parts, slots_of, turns
-from .kernels_warp import sums_of
 from .particle import affine_of, resistance_of, viscous, weights
 from .ranks import PART, PARTS, Ranks, count_off, divide, line_up, sum_of, world_of
 from .together import scatter_together, stencil
+from .transfers import sums_of
 from .walls import in_front, seen
 
 wp.set_module_options({"enable_backward": False})  # no fast math: what is no number must end the iterations

@@ -269,6 +269,7 @@ def passes(alone: bool) -> SimpleNamespace:
         drift: Vectors,
         feeding: Floats,
         moving: Quads,
+        spent: Quads,
     ):
         for t in range(ti.min(active[0] * 64, raw.shape[0])):
             block = block_of[t // 64]
@@ -313,6 +314,8 @@ def passes(alone: bool) -> SimpleNamespace:
                             free = vec4(u[0], u[1], u[2], result[3])
                         result = hold * result + (1.0 - hold) * free
             moving[t] = result
+            if t < spent.shape[0]:
+                spent[t] = vec4(0.0)
 
     return SimpleNamespace(
         reset_blocks=reset_blocks, find_blocks=find_blocks, clear_grid=clear_grid, p2g=p2g, grid_step=grid_step, g2p=g2p

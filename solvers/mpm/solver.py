@@ -19,6 +19,7 @@ from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
 from . import kernels_warp as kernels
 from .by_block import ByBlock
+from .chain import Chain
 from .clamp import Clamps
 from .gaps import Gaps
 from .grid import grid_of
@@ -58,11 +59,13 @@ class SolverMPM(TraitsMPM):
             self.block_of = wp.zeros(slots, dtype=int)
             self.active = wp.zeros(1, dtype=int)
             self.blocks = self.table, self.block_of, self.active
-            self.raw = wp.empty(slots * 64, dtype=NODE)
+            self.raw = wp.zeros(slots * 64, dtype=NODE)
             self.moving = wp.empty(slots * 64, dtype=NODE)
+            self.nothing = wp.zeros(1, dtype=NODE)
         self.started = False
         # particles of one cell share their 27 nodes
         self.order = CellOrder(scene, pool, np.array(self.grid.dx), shift=np.where(scene.periodic, 0.5, 0.0))
+        self.sort_bits = self.order.bits
         self.by_block = (
             ByBlock(scene, pool, self.strains, slots, implicit) if scene.device.is_cpu and backend == "warp" else None
         )
@@ -86,6 +89,8 @@ class SolverMPM(TraitsMPM):
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
+        between = meets or scene.grows or clamps or implicit  # something is, in a substep
+        self.chain = Chain(self) if not (between or scene.device.is_cpu or backend != "warp") else None
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
@@ -97,6 +102,8 @@ class SolverMPM(TraitsMPM):
 
     def refresh(self) -> None:
         pool, scene = self.pool, self.scene
+        if self.chain is not None:
+            self.chain.refresh()
         self._launch("reset_blocks", self.node_lanes, [self.table, self.block_of, self.active, self.node_lanes])
         scene.crew.launch(put, 1, [0, self.active])
         self._launch(
@@ -139,6 +146,12 @@ class SolverMPM(TraitsMPM):
             self.swell()
         for name in self.passes:
             getattr(self, name)()
+
+    def substeps(self, number: int) -> None:
+        if self.chain is None:
+            super().substeps(number)
+        else:
+            self.chain.go(number)
 
     def swell(self) -> None:
         pool = self.pool
@@ -211,10 +224,13 @@ class SolverMPM(TraitsMPM):
         if self.viscosity is not None:
             self.viscosity.solve()
 
-    def walled(self, raw: wp.array, force: wp.array, piston: Any, moving: wp.array) -> None:
-        """Velocities of nodes from their momenta and masses, a force for dt, a piston and walls."""
+    def walled(
+        self, raw: wp.array, force: wp.array, piston: Any, moving: wp.array, spent: wp.array | None = None
+    ) -> None:
+        """Velocities of nodes from their momenta and masses, a force for dt, a piston and walls; empties `spent`."""
         lanes = [self.grid, self.node_lanes, self.active, self.block_of, self.table]
-        self._launch("grid_step", self.node_lanes, [*lanes, raw, self.scene.dt, force, piston], [moving])
+        spent = self.nothing if spent is None else spent
+        self._launch("grid_step", self.node_lanes, [*lanes, raw, self.scene.dt, force, piston], [moving, spent])
 
     def resist(self, nodes: wp.array, image: wp.array) -> None:
         """What viscosity resists the velocities of nodes with, added to momenta: dt A v of implicit.py."""
@@ -283,7 +299,7 @@ class SolverMPM(TraitsMPM):
         if self.scene.changes:
             self.scene.crew.load(aging)
         self.order.prepare()
-        for part in (self.clamps, self.separation, self.settling, self.gaps):
+        for part in (self.clamps, self.separation, self.settling, self.gaps, self.chain):
             if part is not None:
                 part.prepare()
         self.backend.prepare(self)
@@ -331,4 +347,5 @@ class SolverMPM(TraitsMPM):
         more |= {} if self.held is None else self.held.footprint()
         more |= {} if self.separation is None else self.separation.footprint()
         more |= {} if self.gaps is None else self.gaps.footprint()
+        more |= {} if self.chain is None else self.chain.footprint()
         return {name: getattr(self, name).capacity for name in names} | more | footprint_of(self.viscosity)

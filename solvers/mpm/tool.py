@@ -30,12 +30,12 @@ from fluidbench.native.scene import Phase, Scene
 from ..flow import flows, shear_rate
 from ..tool import Tool, distance_to, outside, table_of, tool_of
 from .grid import Grid, first_node, node_parts, slots_of
-from .kernels_warp import sums_of
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
 from .particle import contained, down_the_slope, weights
 from .piston import REACHED, Piston
 from .settling import COMPRESSED, SURFACE
 from .tied import REACH, SLANT, Blocks, Tied, leaning_out
+from .transfers import sums_of
 
 wp.set_module_options({"enable_backward": False})
 
