@@ -47,6 +47,8 @@ class CellOrder:
         self.inverse = wp.vec3(*(1.0 / cell))
         length = np.asarray(domain.upper) - np.asarray(domain.lower)
         self.blocks = wp.vec3i(*(np.ceil(length / (4 * cell)).astype(int) + 1).tolist())
+        per_world = 64 * int(np.prod(np.array(self.blocks, dtype=np.int64))) + 1
+        self.bits = (scene.worlds * per_world - 1).bit_length()  # of the largest key
         self.values = wp.zeros(2 * pool.size, dtype=wp.int64, device=scene.device)
 
     def prepare(self) -> None:

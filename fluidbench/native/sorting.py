@@ -34,7 +34,7 @@ class Sorting:
 
         def rank() -> None:
             wp.copy(self._order, self._identity)
-            wp.utils.radix_sort_pairs(keys, self._order, self.pool.size)
+            wp.utils.radix_sort_pairs(keys, self._order, self.pool.size, 0, self.solver.sort_bits)
 
         self.pool.scene.crew.alone(rank)
         self.pool.permute(self._order)

@@ -98,6 +98,7 @@ class SolverPBD(TraitsPBD):
             if self.elastic is not None:
                 self.elastic.straining.tool = self.tool
         self.order = side_by_side(scene, pool)
+        self.sort_bits = self.order.bits
         self.viscosity = None
         if scene.viscous or self.elastic is not None:
             support, tolerance = self.num.support, config.viscous_tolerance

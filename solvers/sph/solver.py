@@ -95,6 +95,7 @@ class SolverSPH(TraitsSPH):
         )
         self._bring_together()
         self.order = side_by_side(scene, pool)
+        self.sort_bits = self.order.bits
         self.viscosity = None
         if self.implicit:
             support, tolerance = 2.0 * self.num.h, config.viscous_tolerance

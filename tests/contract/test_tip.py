@@ -196,13 +196,14 @@ def test_volume_ratios_diffuse_and_their_mean_stays_but_what_is_strained_takes_i
     sim.scene.set_dt(STEP)
     for name in ("clear_grid", "p2g", "grid_step"):
         getattr(sim.solver, name)()
-    n, frame, cell = sim.pool.counts[0], sim.frame(), sim.solver.grid.dx[2]
-    for start, spread in ((np.where(np.arange(n) % 2, 0.98, 1.02), 0.02), (np.full(n, 0.97), 0.0)):
+    n, cell = sim.pool.counts[0], sim.solver.grid.dx[2]
+    place, held, origin = (sim.pool.fields[name].numpy()[:n] for name in ("position", "held", "origin"))
+    for start, spread in ((np.where(origin % 2, 0.98, 1.02), 0.02), (np.full(n, 0.97), 0.0)):
         found = levelled(sim, start)
         assert found.mean() == pytest.approx(start.mean(), abs=1e-3)
         assert found.std() == pytest.approx(0.0, abs=0.25 * spread + 1e-6)
-    above = frame["position"][:, 2] - sim.scenario.nozzle.standoff
-    deep = (frame["held"] != CARRIED) & (above > 2.0 * cell) & (above < 5.0 * cell)
+    above = place[:, 2] - sim.scenario.nozzle.standoff
+    deep = (held != CARRIED) & (above > 2.0 * cell) & (above < 5.0 * cell)
     begun, done = (levelled(sim, np.full(n, 0.8), strain)[deep] for strain in (0.02, 2.0))
     assert done == pytest.approx(1.0, abs=0.03)
     assert np.exp(-32.0 * 0.02) < np.mean(1.0 - begun) / 0.2 < np.exp(-16.0 * 0.02)
@@ -215,9 +216,10 @@ def test_a_bore_settles_however_few_cells_its_wall_is_thick():
     sim.scene.set_dt(STEP)
     for name in ("clear_grid", "p2g", "grid_step"):
         getattr(sim.solver, name)()
-    n, frame, cell = sim.pool.counts[0], sim.frame(), sim.solver.grid.dx[2]
-    above = frame["position"][:, 2] - sim.scenario.nozzle.standoff
-    deep = (frame["held"] != CARRIED) & (above > 1.6 * cell)
+    n, cell = sim.pool.counts[0], sim.solver.grid.dx[2]
+    place, held = (sim.pool.fields[name].numpy()[:n] for name in ("position", "held"))
+    above = place[:, 2] - sim.scenario.nozzle.standoff
+    deep = (held != CARRIED) & (above > 1.6 * cell)
     before = np.full(n, 0.8)
     assert levelled(sim, before)[deep] == pytest.approx(0.8, abs=1e-3)
     assert (levelled(sim, before, 2.0)[deep] > 0.9).all()
