@@ -116,7 +116,6 @@ class Simulation(Session):
     def begin(self) -> Vital:
         self.scene.clock.show(0)
         self._age(self._expect())
-        self.sorting.sort()
         self._refresh()
         return self.look()
 
@@ -138,7 +137,7 @@ class Simulation(Session):
         """One tick: feed, plan, and run its substeps. A GPU is never idle for it, but where matter gives birth."""
         if not self.scene.device.is_cpu and self.done % LOOK_TICKS == 0:
             self._exchange()
-        if self.done % sorting.EVERY == 0 and self.done > 0:
+        if self.done % sorting.EVERY == 0:
             self.sorting.sort()
         self.scene.clock.show(self.done)
         feeding = self._expect()
