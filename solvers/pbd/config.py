@@ -18,7 +18,7 @@ class ConfigPBD(Config):
     advance: Annotated[float, Field(gt=0, le=1)] = Field(0.125, description="accuracy: spacings moved per substep")
     relaxation: Annotated[float, Field(gt=0)] = Field(0.2, description="constraint force mixing epsilon")
     over_relaxation: Annotated[float, Field(gt=0, le=2)] = Field(1.0, description="factor on each Jacobi correction")
-    viscous_tolerance: Tolerance = 1e-4
+    viscous_tolerance: Tolerance = 1e-3
     hourglass: Annotated[float, Field(ge=0, le=1)] = Field(
         1.0, description="zeta: stiffness, over G, of motion that no velocity gradient shows; 0 in what expands"
     )
