@@ -142,6 +142,9 @@ class Session(ABC):
         """Most memory that was in use on the GPU; None where that is not known, or there is none."""
         return None
 
+    def sort(self) -> None:  # noqa: B027
+        """Put particles into the order in which the method is fastest, as a run does now and then, if there is one."""
+
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, with or without `begin`: for experiments on
         stability. Raises UserError where it cannot be told."""

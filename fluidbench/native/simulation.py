@@ -79,11 +79,10 @@ class Simulation(Session):
         self.done = 0
         self.unseen = True  # whether somebody else may have changed the particles since the last audit
         self.aged = 0  # ticks that this process has run
-        self._disordered = 0.0  # since a march sorted particles [s]
         self._planned: tuple[float, float, Plan] | None = None  # speed, end of its validity [s], plan
         self.posted: Letter | None = None  # a reading on its way from a GPU
         self.heard = Vital(self.speed, 0.0, 0.0, None)
-        self.substep_launches = self.process_launches = 0  # of a substep; of the processes a tick, at most
+        self.substep_launches = self.process_launches = 0  # of a substep, of the processes a tick; at most
         self._use_graphs = graphs and target.backend == DEFAULT_BACKEND
         self.sorting = Sorting(self.pool, self.solver, self._use_graphs)
 
@@ -138,7 +137,7 @@ class Simulation(Session):
         if not self.scene.device.is_cpu and self.done % LOOK_TICKS == 0:
             self._exchange()
         if self.done % sorting.EVERY == 0:
-            self.sorting.sort()
+            self.sort()
         self.scene.clock.show(self.done)
         feeding = self._expect()
         steps = self._plan()
@@ -245,12 +244,11 @@ class Simulation(Session):
             self.solver.make_room(self.placed)
             self._wait()
 
+    def sort(self) -> None:
+        self.sorting.sort()
+
     def march(self, dt: float, substeps: int) -> None:
         """Take substeps of a given dt [s], whatever the bounds say, without emission: for experiments on stability."""
-        if self._disordered >= sorting.EVERY * self.tick:
-            self.sorting.sort()
-            self._disordered = 0.0
-        self._disordered += substeps * dt
         self._audit()
         self._refresh()
         self.scene.set_dt(dt)
@@ -334,7 +332,7 @@ class Simulation(Session):
                     for part in (self.solver.substep, *after):
                         part()
         if self.scene.crew.leading:
-            self.substep_launches = math.ceil(counted.count / number)
+            self.substep_launches = max(self.substep_launches, math.ceil(counted.count / number))
 
     def _run(self, substeps: int) -> None:
         """Replay `substeps` substeps: one graph a substep on the CPU, one for all on CUDA."""

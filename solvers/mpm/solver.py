@@ -89,7 +89,7 @@ class SolverMPM(TraitsMPM):
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
-        between = meets or scene.grows or clamps or implicit  # something is, in a substep
+        between = meets or scene.grows or clamps or implicit or self.held is not None  # what a chain leaves out
         self.chain = Chain(self) if not (between or scene.device.is_cpu or backend != "warp") else None
 
     def kernels_of(self, backend: str) -> SimpleNamespace:

@@ -40,7 +40,7 @@ def give(
     """Strain and stress of particle p, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18). On a GPU
     the whole warp must ask; one that is not `active` computes, but writes nothing."""
     m = mass[p]
-    x = position[p]
+    x = wp.where(active, position[p], 0.5 * (grid.lower + grid.upper))
     a = stressed(
         grid,
         dt,
