@@ -6,11 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import warp as wp
 
 from ..errors import UserError
-from ..method.contract import Session, Steps
-from ..method.frame import Frame
+from ..method.contract import Steps
 from ..method.suitability import Demands, check_backend, refusal
 from ..method.target import DEFAULT_BACKEND, HERE, Target
 from ..method.timestep import SPEED_MARGIN, Bound, Plan, plan
@@ -28,6 +26,7 @@ from .process.curing import Curing
 from .process.emission import Emission
 from .process.expansion import Growing
 from .process.placement import Placement
+from .readout import Readout
 from .scene import Scene
 from .solver import Solver
 from .sorting import Sorting
@@ -35,7 +34,7 @@ from .sorting import Sorting
 LOOK_TICKS = 8  # ticks between looks on a GPU, where looking waits for it
 
 
-class Simulation(Session):
+class Simulation(Readout):
     """One native method on one scenario, or on several worlds of it."""
 
     resumable = True
@@ -297,29 +296,8 @@ class Simulation(Session):
         self._audit()
         return self.health.broken()
 
-    def frame(self, world: int = 0) -> Frame:
-        """A world's particles as they are now, see method/frame.py."""
-        spins, more = self.solver.spins(), {}
-        more["spin"] = np.zeros((self.pool.size, 3), np.float32) if spins is None else spins
-        for name, values in (("stress", self.solver.shear_stresses()), ("pressure", self.solver.pressures())):
-            if values is not None:
-                more[name] = values
-        found = self.pool.snapshot(world, density=self.solver.densities(), **more)
-        return {"time": np.array(self.now), **found}
-
-    def frames(self) -> list[Frame]:
-        return [self.frame(world) for world in range(self.scene.worlds)]
-
-    def glimpse(self) -> Frame:
-        pool, n = self.pool, self.pool.counts[0]
-        return {name: pool.fields[name][:n].numpy() for name in ("position", "birth_time", "phase")}
-
     def kick(self, velocity: np.ndarray) -> None:
         self.pool.velocity.assign(velocity.astype(np.float32))
-
-    @property
-    def capacity(self) -> int:
-        return self.pool.size
 
     def _substeps(self, number: int) -> None:
         """Everything of so many substeps, as it is captured."""
@@ -352,45 +330,6 @@ class Simulation(Session):
     def _wait(self) -> None:
         if self.solver.backend is not None:
             self.solver.backend.wait()
-
-    def footprint(self) -> dict[str, int]:
-        """Bytes by part of everything allocated: the pool, the method, and each process that is on."""
-        owners = {
-            "pool": self.pool,
-            "solver": self.solver,
-            "curing": self.curing,
-            "expansion": self.growing,
-            "contact": self.contact,
-        }
-        return {
-            f"{owner}.{name}": size
-            for owner, part in owners.items()
-            if part is not None
-            for name, size in part.footprint().items()
-        }
-
-    def traffic(self) -> dict[str, float] | None:
-        """The solver's, and each of its particles' fields read and written once."""
-        found = self.solver.traffic()
-        if found is not None:
-            used = sum(self.pool.counts) / self.pool.size
-            found["memory"] += 2.0 * used * sum(array.capacity for array in self.pool.fields.values())
-        return found
-
-    def statistics(self) -> dict[str, Any]:
-        """Launches of kernels, of a substep and of the processes a tick, at most; what solves took."""
-        launches = {"per_substep": self.substep_launches, "process_per_tick": self.process_launches}
-        return {"launches": launches, "solves": self.solver.solves()}
-
-    def peak_device_bytes(self) -> int | None:
-        device = self.scene.device
-        return None if device.is_cpu else wp.get_mempool_used_mem_high(device)
-
-    def arrays(self) -> dict[str, wp.array]:
-        """Everything on the device that a run must have to go on as it was."""
-        found = {f"pool.{name}": array for name, array in self.pool.fields.items()}
-        found |= {"pool.count": self.pool.count, "pool.fault": self.pool.fault}
-        return found | {f"solver.{name}": array for name, array in self.solver.carried().items()}
 
     def state(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         progress: dict[str, Any] = {
