@@ -61,7 +61,7 @@ class SolverMPM(TraitsMPM):
             self.blocks = self.table, self.block_of, self.active
             self.raw = wp.zeros(slots * 64, dtype=NODE)
             self.moving = wp.empty(slots * 64, dtype=NODE)
-            self.nothing = wp.zeros(1, dtype=NODE)
+            self.nothing = wp.zeros(1, dtype=NODE)  # for the grid to empty where no other nodes are to be
         self.started = False
         # particles of one cell share their 27 nodes
         self.order = CellOrder(scene, pool, np.array(self.grid.dx), shift=np.where(scene.periodic, 0.5, 0.0))
