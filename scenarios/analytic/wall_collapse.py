@@ -125,7 +125,7 @@ CASE = Case(
     "worst share of layers beyond what lies between experiment and computation",
     spacing=HEIGHT / 6,
     tolerance=0.06,
-    causes={"pbd": "13 layers of LM30, printed 10 times faster (12 computed): 12 or 13 by the last digits of a solve"},
+    causes={"pbd": "13 layers of LM30, printed 10 times faster (12 computed): 12 or 13 by its solve's tolerance"},
     scenarios=scenarios,
     evaluate=evaluate,
     quick=HEIGHT / 4,

@@ -41,7 +41,7 @@ def drop(material, chained, **more):
 
 
 def same(one, chained):
-    """All that is known of every particle, and how many blocks there are, which are more than at rest."""
+    """All that is known of every particle, and how many blocks there are."""
     assert not one.pool.fault.numpy()[0] and not chained.pool.fault.numpy()[0]
     assert one.pool.counts == chained.pool.counts == [7**3] * 2 and one.pool.capacity > 7**3
     for name in one.pool.fields:
