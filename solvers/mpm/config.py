@@ -16,7 +16,7 @@ class ConfigMPM(Config):
     shifting: Annotated[float, Field(ge=0)] = Field(
         8.0,
         description="rate, over that of shear, at which particles diffuse out of crowds, in dx^2, and volume ratios "
-        "settle towards the room that there is; beside a body shifting goes into gaps, too",
+        "settle towards the room that there is; beside a body liquids are shifted into gaps, too",
     )
     separation: Annotated[float, Field(ge=0)] = Field(
         1.0, description="shift of particles that are too near each other, over strain and crowding"

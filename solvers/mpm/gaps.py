@@ -9,7 +9,8 @@ and the push of its own stress, in place of the mean of all,
     v_ip = v_i + g (v_p + (C_p - 4 dt V0 tau / (m_p dx^2)) (x_i - x_p) + dt force - v_i)
 
 The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. Through
-such nodes nothing pushes, drags or strains.
+such nodes nothing pushes, drags or strains. (Beside a body pressure of what is elastic is no part of tau, but acts by
+way of nodes that are in no gap: dilation.py.)
 """
 
 import math
@@ -29,7 +30,7 @@ from . import gap_nodes
 from .gap_nodes import APPROACH, RANDOM, Known, due, find_gaps, with_gaps
 from .grid import Grid, first_node, node_parts, slots_of, turns
 from .nodes import follow
-from .particle import columns_scaled, contained, kirchhoff, resistance_of, viscous, weights
+from .particle import columns_scaled, contained, kirchhoff, mean_stress, presses_nodes, resistance_of, viscous, weights
 from .tied import TIED
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -101,7 +102,10 @@ def keep_own(
                 )
                 f, wx, wy, wz = weights(grid, position[p], base)
                 phase = phases[world, phase_of[p]]
-                tau = kirchhoff(phase, volume_ratio[p], elastic_normal[p], elastic_shear[p])
+                mean = float(0.0)
+                if known.tied == 0.0 or not presses_nodes(phase):
+                    mean = mean_stress(phase, volume_ratio[p])
+                tau = kirchhoff(phase, mean, elastic_normal[p], elastic_shear[p])
                 if phase.viscosity > 0.0:
                     tau += viscous(phase, volume_ratio[p], affine[p])
                 a = columns_scaled(affine[p], grid.dx) - resistance_of(grid, dt[world], volume[p], tau) / mass[p]
@@ -118,10 +122,10 @@ def keep_own(
                             far = wp.where(by[q] == by[0], t2, t3)
                             slot = wp.where(bx[o] == bx[0], near, far)
                             at = wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r]
-                            mean = load_vec4(moving, at)
+                            all = load_vec4(moving, at)
                             part = wp.where(slot >= 0, wx[o] * wy[q] * wz[r] * known.gap[at], 0.0)
                             off = wp.vec3(float(o), float(q), float(r)) - f
-                            u = part * (v + a * off - wp.vec3(mean[0], mean[1], mean[2]))
+                            u = part * (v + a * off - wp.vec3(all[0], all[1], all[2]))
                             more += u
                             turn += wp.outer(u, off)
                 member = int(t)
@@ -199,25 +203,19 @@ class Gaps:
         """Enqueue: nodes have other numbers, so look anew."""
         self.scene.crew.launch(put, 1, [-1, self.known.row])
 
-    def look(
-        self,
-        table: wp.array,
-        block_of: wp.array,
-        active: wp.array,
-        raw: wp.array,
-        moving: wp.array,
-        piston: Any,
-    ) -> None:
-        """Enqueue: find gaps, and what particles that have nodes in them would keep; before they gather and move."""
+    def look(self, table: wp.array, block_of: wp.array, active: wp.array, raw: wp.array, piston: Any) -> None:
+        """Enqueue: find gaps by what particles gave."""
+        lanes, row = [self.grid, self.lanes], self.scene.clock.hours.row
+        nodes = [active, block_of, table, raw, self.scene.phases, piston, self.tool, row]
+        self.launch(find_gaps, self.lanes, [*lanes, *nodes], [self.known])
+
+    def keep(self, table: wp.array, moving: wp.array) -> None:
+        """Enqueue: what particles that have nodes in gaps would keep; before they gather and move."""
         pool, scene, row = self.pool, self.scene, self.scene.clock.hours.row
-        some, lanes = [self.grid, self.lanes], self.lanes
-        nodes = [active, block_of, table, raw]
-        self.launch(find_gaps, lanes, [*some, *nodes, scene.phases, piston, self.tool, row], [self.known])
-        some.append(pool.capacity)
         matter = [pool.phase, pool.position, pool.velocity, pool.affine, pool.mass, pool.volume]
         matter += [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear]
         given = [pool.count, pool.held, scene.dt, scene.force, scene.phases, *matter, table, moving, row]
-        self.launch(keep_own, lanes, [*some, *given], [self.known])
+        self.launch(keep_own, self.lanes, [self.grid, self.lanes, pool.capacity, *given], [self.known])
 
     def go_on(self, table: wp.array, block_of: wp.array, active: wp.array, homes: Any) -> None:
         """Enqueue: let them, once they have."""

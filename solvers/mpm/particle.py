@@ -16,7 +16,8 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 spline = warp_func(quadratic_spline)
 FAULT_STENCIL = 2
-# How viscosity is taken in a step, `drags`: solved for; as a stress; the same, where what is carried is stressed, too.
+# How viscosity is taken in a step, `drags`: solved for; as a stress; the same, where what is carried is stressed, too,
+# and what is elastic presses by way of nodes (dilation.py).
 IMPLICIT, EXPLICIT, PRESSED = wp.constant(0), wp.constant(1), wp.constant(2)
 STEEPEST = wp.constant(1.0 / 6.0)  # D dt / dx^2 up to which explicit diffusion is stable in three dimensions
 ANCHORED = wp.constant(10.0)  # crowding on the grid that only clamps can make (clamp.py) [-]
@@ -40,11 +41,22 @@ def columns_scaled(m: wp.mat33, by: wp.vec3):
 
 
 @wp.func
-def kirchhoff(phase: Phase, volume_ratio: float, b: wp.vec3, s: wp.vec3):
-    """Kirchhoff stress [Pa] without viscosity, from J and the elastic tensor (b: diagonal, s: xy, xz, yz)."""
-    p = volume_ratio * pressure(1.0 / volume_ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+def mean_stress(phase: Phase, volume_ratio: float):
+    """The mean of Kirchhoff stress [Pa], from J: pressure, turned round."""
+    return -volume_ratio * pressure(1.0 / volume_ratio - 1.0, phase.bulk_modulus, phase.tait, phase.tension_limit)
+
+
+@wp.func
+def presses_nodes(phase: Phase):
+    """Whether, beside a body, the mean stress of such matter acts by way of nodes (dilation.py)."""
+    return phase.shear_modulus > 0.0
+
+
+@wp.func
+def kirchhoff(phase: Phase, mean: float, b: wp.vec3, s: wp.vec3):
+    """Kirchhoff stress [Pa] without viscosity, from its mean and the elastic tensor (b: diagonal, s: xy, xz, yz)."""
     g = phase.shear_modulus
-    m = g * (b[0] + b[1] + b[2]) / 3.0 + p
+    m = g * (b[0] + b[1] + b[2]) / 3.0 - mean
     return wp.mat33(
         g * b[0] - m,
         g * s[0],
@@ -129,7 +141,10 @@ def stressed(
             elastic_normal[p] = b
             elastic_shear[p] = s
     if on and dt > 0.0 and (held[p] != CARRIED or drags == PRESSED):
-        tau = kirchhoff(phase, j, b, s)
+        mean = float(0.0)
+        if drags != PRESSED or not presses_nodes(phase):
+            mean = mean_stress(phase, j)
+        tau = kirchhoff(phase, mean, b, s)
         if drags != IMPLICIT and phase.viscosity > 0.0:
             tau += viscous(phase, j, c)
         a -= resistance_of(grid, dt, volume[p], tau)

@@ -184,10 +184,21 @@ class SolverMPM(TraitsMPM):
         """Strain and stress within dt, momentum and mass to nodes that are empty."""
         drags = int(EXPLICIT if self.held is None else PRESSED) if self.viscosity is None else int(IMPLICIT)
         self.give(dt, drags, raw)
-        if self.held is not None:
-            self.held.tied.give(dt, self.blocks, raw)
         if self.clamps is not None:
             self.clamps.hold(self.table, raw)
+        if self.gaps is not None:
+            self.gaps.look(*self.blocks, raw, self.piston)
+        if self.held is not None:
+            self.press(dt, raw)
+            self.held.tied.give(dt, self.blocks, raw)
+
+    def press(self, dt: wp.array, raw: wp.array) -> None:
+        """Pressure of what is elastic beside a body, which pushes by way of nodes."""
+        assert self.held is not None
+        dilation = self.held.dilation
+        if dilation is not None:
+            self.empty(dilation.nodes)
+            dilation.press(dt, self.blocks, None if self.gaps is None else self.gaps.known.gap, raw)
 
     def give(self, dt: wp.array, drags: int, raw: wp.array) -> None:
         """The same, of particles themselves."""
@@ -250,10 +261,12 @@ class SolverMPM(TraitsMPM):
     def g2p(self) -> None:
         if self.held is not None:
             self.empty(self.held.nodes)
+            if self.held.dilation is not None:
+                self.held.dilation.tell(self.blocks, self.moving)
             self.held.level(self.table, self.piston, self.moving)
         homes = None if self.by_block is None else self.by_block.homes
         if self.gaps is not None:
-            self.gaps.look(*self.blocks, self.raw, self.moving, self.piston)
+            self.gaps.keep(self.table, self.moving)
         self.gather()
         if self.gaps is not None:
             self.gaps.go_on(*self.blocks, homes)

@@ -11,11 +11,12 @@ heard is 0 beside free surfaces, of which a bore has none; the margin that of se
 nodes hear only the mean. What is elastic has its 2 %, too: a room that flickers as particles pass nodes shakes what no
 viscosity damps, and that strains it, the more it follows. (Without any, a stiff paste blew up within 0.3 s.)
 
-Particles follow streamlines, and those nearest to a wall leave it where it turns: of what flows at s from the wall of a
-bore there is nothing nearer, and past the rim it flows at some 3 s from the face. No strain tells of the gap, and a
-strand let go of the face that should hold it. So here shifting goes both ways, into gaps, too; beside a free surface
-only towards a bore's wall or a face (what has left these is in air: drawn on, it climbed the tip). What it takes of
-volume, J learns as it settles.
+What is elastic, as pastes are, gains the volume that flows out of its space (dilation.py). Liquids follow streamlines,
+and what is nearest to a wall leaves it where it turns: of what flows at s from the wall of a bore there is nothing
+nearer, and past the rim it flows at some 3 s from the face. No strain tells of the gap, and a strand let go of the face
+that should hold it. So shifting of liquids goes both ways here, into gaps, too; beside a free surface only towards a
+bore's wall or a face (what has left these is in air: drawn on, it climbed the tip). What it takes of volume, J learns
+as it settles. (Pastes that were so shifted were laid a tenth too large.)
 """
 
 from typing import Any
@@ -29,9 +30,10 @@ from fluidbench.native.scene import Phase, Scene
 
 from ..flow import flows, shear_rate
 from ..tool import Tool, distance_to, outside, table_of, tool_of
+from .dilation import Dilation, untold
 from .grid import Grid, first_node, node_parts, slots_of
 from .nodes import follow, mean_of_nodes, room_of, tell_nodes
-from .particle import contained, down_the_slope, weights
+from .particle import contained, down_the_slope, presses_nodes, weights
 from .piston import REACHED, Piston
 from .settling import COMPRESSED, SURFACE
 from .tied import REACH, SLANT, Blocks, Tied, leaning_out
@@ -104,8 +106,9 @@ def into_gaps(
     table: wp.array(dtype=int),
     moving: wp.array(dtype=wp.vec4),
 ):
-    """How far a free particle is shifted into a gap [m]: down the slope of the density where rho J < rho0; where the
-    `least` full of its nodes says that a free surface is near, only towards a bore's wall or a face."""
+    """How far a free particle of a liquid is shifted into a gap [m]: down the slope of the density where
+    rho J < rho0; where the `least` full of its nodes says that a free surface is near, only towards a bore's wall or a
+    face."""
     by = wp.vec3(0.0, 0.0, 0.0)
     sums = gathered(grid, world, x, table, moving)
     crowding = sums[0, 3] * volume_ratio / density
@@ -204,11 +207,13 @@ def level(
     table: wp.array(dtype=int),
     nodes: wp.array(dtype=wp.vec4),
     moving: wp.array(dtype=wp.vec4),
+    rate: wp.array(dtype=float),
     # outputs
     volume_ratio: wp.array(dtype=float),
     shift: wp.array(dtype=wp.vec3),
 ):
-    """Volume ratios diffuse towards those of the nodes and settle towards the room that there is; shifts into gaps."""
+    """Volume ratios diffuse towards those of the nodes and settle towards the room that there is. Those of what is
+    elastic grow by what affine fields do not tell of, too; liquids are shifted into gaps."""
     p = index_of(share, wp.tid())
     world = p / capacity
     if p - world * capacity < count[world]:
@@ -221,6 +226,9 @@ def level(
             moves = flows(phase, affine[p], elastic_normal[p], elastic_shear[p], dt[world], p, plastic)
         if moves:
             change += wp.min(SETTLING * dt[world] * shear_rate(affine[p]), 1.0) * (mean[1] - mean[0])
+        if presses_nodes(phase):
+            change += j * dt[world] * untold(grid, world, x, table, moving, rate)
+        elif moves:
             density, step = mass[p] / volume[p], shifting * dt[world]
             by = into_gaps(grid, tool, reach, world, density, x, affine[p], step, j, room[p][1], table, moving)
         volume_ratio[p] = j + change
@@ -238,11 +246,13 @@ class Held:
         self.near = NEAR * max(grid.dx)
         self.tool = tool_of(scene, REACH * max(grid.dx) + scene.spacing)
         self.tied = Tied(scene, grid, self.tool, slots, lanes)
+        self.dilation = Dilation(scene, pool, grid, slots, lanes) if scene.elastic else None
         with wp.ScopedDevice(scene.device):
             self.nodes = wp.zeros(64 * slots, dtype=wp.vec4)
             self.room = wp.zeros(pool.size, dtype=wp.vec2)
             self.shift = wp.zeros(pool.size, dtype=wp.vec3)
             self._nobody = wp.zeros(1, dtype=int)
+            self._untold = wp.zeros(1, dtype=float)
 
     def keep_out(self, blocks: Blocks, homes: Any) -> None:
         """Enqueue: shift what is to be shifted, and keep all in front."""
@@ -265,9 +275,11 @@ class Held:
         flow = [scene.dt, scene.phases, pool.phase, pool.position, pool.affine, pool.mass, pool.volume, pool.held]
         flow += [pool.elastic_normal, pool.elastic_shear, self.plastic]
         inputs = [self.grid, self.tool, self.near, *some, *flow, self.shifting, self.room, table, self.nodes, moving]
+        inputs.append(self._untold if self.dilation is None else self.dilation.rate)
         launch(level, pool.size, inputs, [pool.volume_ratio, self.shift])
 
     def footprint(self) -> dict[str, int]:
         names = ("nodes", "room", "shift")
         own = {f"tool.{name}": getattr(self, name).capacity for name in names}
-        return own | self.tied.footprint() | table_of(self.tool)
+        told = {} if self.dilation is None else self.dilation.footprint()
+        return own | self.tied.footprint() | told | table_of(self.tool)
