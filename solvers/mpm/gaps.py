@@ -122,10 +122,10 @@ def keep_own(
                             far = wp.where(by[q] == by[0], t2, t3)
                             slot = wp.where(bx[o] == bx[0], near, far)
                             at = wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r]
-                            all = load_vec4(moving, at)
+                            there = load_vec4(moving, at)
                             part = wp.where(slot >= 0, wx[o] * wy[q] * wz[r] * known.gap[at], 0.0)
                             off = wp.vec3(float(o), float(q), float(r)) - f
-                            u = part * (v + a * off - wp.vec3(all[0], all[1], all[2]))
+                            u = part * (v + a * off - wp.vec3(there[0], there[1], there[2]))
                             more += u
                             turn += wp.outer(u, off)
                 member = int(t)
