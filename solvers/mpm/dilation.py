@@ -37,6 +37,47 @@ from .tied import Blocks, node_here
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 LEAST = wp.constant(1.0e-6)  # S, of edges that tell anything
+Around: Any = wp.types.vector(length=27, dtype=wp.int32)  # of nodes, where they lie; z varies fastest
+Shares: Any = wp.types.vector(length=27, dtype=wp.float32)
+
+
+@wp.func
+def around(grid: Grid, world: int, base: wp.vec3i, table: wp.array(dtype=int)):
+    """Where the 27 nodes from `base` on lie, -1 where there is none."""
+    at = Around()
+    for o in range(3):
+        for q in range(3):
+            for r in range(3):
+                at[9 * o + 3 * q + r] = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
+    return at
+
+
+@wp.func
+def around_node(grid: Grid, block_of: wp.array(dtype=int), t: int, table: wp.array(dtype=int)):
+    """(world of the t-th of all active nodes; where it and those about it lie)"""
+    world, node = node_here(grid, block_of, t)
+    return world, around(grid, world, node - wp.vec3i(1, 1, 1), table)
+
+
+@wp.func
+def filled(at: Around, nodes: wp.array(dtype=wp.vec4)):
+    """f of nodes, 0 where there is none."""
+    full = Shares()
+    for n in range(27):
+        if at[n] >= 0:
+            full[n] = nodes[at[n]][3]
+    return full
+
+
+@wp.func
+def beside(axis: int, line: int):
+    """(in the middle of an axis, the line-th of nine nodes across it; from there to the next along it; its weight)"""
+    b, c = line / 3, line % 3
+    along = wp.where(axis == 0, 9, wp.where(axis == 1, 3, 1))
+    first = wp.where(axis == 0, 3, 9)
+    second = wp.where(axis == 2, 3, 1)
+    w = wp.where(b == 1, 4.0, 1.0) * wp.where(c == 1, 4.0, 1.0) / 36.0
+    return along + first * b + second * c, along, w
 
 
 @wp.kernel
@@ -63,12 +104,13 @@ def tell(
         row = volume[p] * wp.vec4(push, 0.0, 0.0, grid.inv_volume)
         base = first_node(grid, position[p])
         _f, wx, wy, wz = weights(grid, position[p], base)
+        at = around(grid, world, base, table)
         for o in range(3):
             for q in range(3):
                 for r in range(3):
-                    at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
-                    if at >= 0:
-                        wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * row)
+                    n = 9 * o + 3 * q + r
+                    if at[n] >= 0:
+                        wp.atomic_add(nodes, at[n], (wx[o] * wy[q] * wz[r]) * row)
 
 
 @wp.kernel
@@ -91,39 +133,6 @@ def bound(
         t += step
 
 
-@wp.func
-def along(axis: int):
-    """To the next node along an axis."""
-    step = wp.vec3i(0, 0, 0)
-    step[axis] = 1
-    return step
-
-
-@wp.func
-def across(axis: int, line: int):
-    """(to the line-th of nine nodes across an axis, its weight)"""
-    b, c = line / 3 - 1, line % 3 - 1
-    step = wp.vec3i(0, 0, 0)
-    step[(axis + 1) % 3] = b
-    step[(axis + 2) % 3] = c
-    return step, wp.where(b == 0, 4.0, 1.0) * wp.where(c == 0, 4.0, 1.0) / 36.0
-
-
-@wp.func
-def place(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int)):
-    """Where a node lies among nodes, -1 where there is none; it may be one beyond the end of a periodic axis."""
-    return node_at(grid, world, on_grid(grid, node), table)
-
-
-@wp.func
-def fullness(at: int, nodes: wp.array(dtype=wp.vec4)):
-    """f of a node, 0 where there is none."""
-    full = float(0.0)
-    if at >= 0:
-        full = nodes[at][3]
-    return full
-
-
 @wp.kernel
 def weigh(
     share: wp.vec3i,
@@ -139,17 +148,15 @@ def weigh(
     """P / S along each axis, for every node."""
     t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, nodes.shape[0]))
     while t < end:
-        world, node = node_here(grid, block_of, t)
         found = wp.vec3(0.0, 0.0, 0.0)
         if nodes[t][0] != 0.0:
+            _world, at = around_node(grid, block_of, t, table)
+            full = filled(at, nodes)
             for axis in range(3):
                 total = float(0.0)
                 for line in range(9):
-                    aside, w = across(axis, int(line))
-                    middle = fullness(place(grid, world, node + aside, table), nodes)
-                    below = fullness(place(grid, world, node + aside - along(axis), table), nodes)
-                    above = fullness(place(grid, world, node + aside + along(axis), table), nodes)
-                    total += w * middle * (below + above)
+                    n, along, w = beside(axis, int(line))
+                    total += w * full[n] * (full[n - along] + full[n + along])
                 if total > LEAST:
                     found[axis] = nodes[t][0] / total
         pull[t] = found
@@ -157,17 +164,12 @@ def weigh(
 
 
 @wp.func
-def pulled(
-    grid: Grid, world: int, node: wp.vec3i, axis: int, table: wp.array(dtype=int), pull: wp.array(dtype=wp.vec3)
-):
-    """The weighted sum of P / S along an axis over the nine nodes across it."""
-    total = float(0.0)
-    for line in range(9):
-        aside, w = across(axis, int(line))
-        at = place(grid, world, node + aside, table)
-        if at >= 0:
-            total += w * pull[at][axis]
-    return total
+def pull_of(at: int, axis: int, pull: wp.array(dtype=wp.vec3)):
+    """P / S of a node along an axis, 0 where there is none."""
+    found = float(0.0)
+    if at >= 0:
+        found = pull[at][axis]
+    return found
 
 
 @wp.kernel
@@ -188,18 +190,20 @@ def press(
     which 18 nodes about their ends tell of."""
     t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, nodes.shape[0]))
     while t < end:
-        full = nodes[t][3]
-        if full > 0.0:
-            world, node = node_here(grid, block_of, t)
+        if nodes[t][3] > 0.0:
+            world, at = around_node(grid, block_of, t, table)
+            full = filled(at, nodes)
             given = wp.vec4(0.0, 0.0, 0.0, 0.0)
             for axis in range(3):
-                below, above = node - along(axis), node + along(axis)
-                f_below = fullness(place(grid, world, below, table), nodes)
-                f_above = fullness(place(grid, world, above, table), nodes)
-                here = pulled(grid, world, node, axis, table, pull)
-                from_below = f_below * (pulled(grid, world, below, axis, table, pull) + here)
-                from_above = f_above * (pulled(grid, world, above, axis, table, pull) + here)
-                given[axis] = -dt[world] * grid.inv_dx[axis] * full * (from_below - from_above)
+                below, here, above = float(0.0), float(0.0), float(0.0)
+                for line in range(9):
+                    n, along, w = beside(axis, int(line))
+                    below += w * pull_of(at[n - along], axis, pull)
+                    here += w * pull_of(at[n], axis, pull)
+                    above += w * pull_of(at[n + along], axis, pull)
+                n, along, _w = beside(axis, 4)
+                push = full[n] * (full[n - along] * (below + here) - full[n + along] * (here + above))
+                given[axis] = -dt[world] * grid.inv_dx[axis] * push
             raw[t] = raw[t] + given
         t += step
 
@@ -220,27 +224,22 @@ def dilate(
     """D of every node [1/s]."""
     t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, nodes.shape[0]))
     while t < end:
-        world, node = node_here(grid, block_of, t)
         found = float(0.0)
         if nodes[t][3] > 0.0:
+            _world, at = around_node(grid, block_of, t, table)
+            full = filled(at, nodes)
             for axis in range(3):
                 total, flux = float(0.0), float(0.0)
                 for line in range(9):
-                    aside, w = across(axis, int(line))
-                    at = place(grid, world, node + aside, table)
-                    middle = w * fullness(at, nodes)
-                    if middle > 0.0:
-                        v = moving[at][axis]
-                        below = place(grid, world, node + aside - along(axis), table)
-                        if below >= 0:
-                            edge = middle * fullness(below, nodes)
-                            total += edge
-                            flux += edge * (v - moving[below][axis])
-                        above = place(grid, world, node + aside + along(axis), table)
-                        if above >= 0:
-                            edge = middle * fullness(above, nodes)
-                            total += edge
-                            flux += edge * (moving[above][axis] - v)
+                    n, along, w = beside(axis, int(line))
+                    if full[n] > 0.0:
+                        v = moving[at[n]][axis]
+                        for side in range(2):
+                            m = n + wp.where(side == 0, -along, along)
+                            edge = w * full[n] * full[m]
+                            if edge > 0.0:
+                                total += edge
+                                flux += edge * wp.where(side == 0, -1.0, 1.0) * (moving[at[m]][axis] - v)
                 if total > LEAST:
                     found += flux / total * grid.inv_dx[axis]
         dilation[t] = found
@@ -263,7 +262,7 @@ def untold(
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                at = place(grid, world, base + wp.vec3i(o, q, r), table)
+                at = node_at(grid, world, on_grid(grid, base + wp.vec3i(o, q, r)), table)
                 if at >= 0:
                     away = wp.cw_mul(wp.vec3(float(o), float(q), float(r)) - f, grid.inv_dx)
                     v = wp.vec3(moving[at][0], moving[at][1], moving[at][2])
