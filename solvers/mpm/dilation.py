@@ -18,7 +18,7 @@ does just the work of the strain that is read, whatever the law, and no momentum
 
 (tau_m: the mean Kirchhoff stress; shape and what resists it stay with the affine field of each particle). As f falls
 with the mass of a node, what is nearly empty is not thrown. Liquids, which are shifted into gaps (tool.py), keep the
-divergence of their affine fields: by this one strands of them left the floor and sank behind the tip.
+divergence of their affine fields: by this one, and not shifted, strands of them left the floor and sank behind the tip.
 """
 
 from typing import Any

@@ -36,13 +36,13 @@ def places(solver):
     return np.array(grid.origin) + (corner[:, None] + inner[None]).reshape(-1, 3) * np.array(grid.dx)
 
 
-def told(sim, velocity):
+def told(sim, velocity, gap=None):
     """(P, f, D, F) of active nodes, of which those given are the velocities."""
     solver, dilation = sim.solver, sim.solver.held.dilation
     sim.scene.dt.fill_(1.0)
     solver.empty(solver.raw)
     solver.empty(dilation.nodes)
-    dilation.press(sim.scene.dt, solver.blocks, None, solver.raw)
+    dilation.press(sim.scene.dt, solver.blocks, gap, solver.raw)
     moving = solver.moving.numpy()
     moving[: len(velocity), :3] = velocity
     solver.moving.assign(moving)
@@ -99,15 +99,15 @@ def test_pressure_does_the_work_of_the_dilation_that_is_read_and_makes_no_moment
 
 def test_what_lies_in_a_gap_neither_presses_nor_tells():
     sim = heap()
-    dilation, x = sim.solver.held.dilation, places(sim.solver)
+    x = places(sim.solver)
     closed = np.abs(x[:, 2] - D / 2) < 0.6 * sim.solver.grid.dx[2]
-    gap = np.zeros(len(dilation.rate))
+    gap = np.zeros(len(sim.solver.held.dilation.rate))
     gap[: len(x)] = closed
-    sim.scene.dt.fill_(1.0)
-    sim.solver.empty(dilation.nodes)
-    dilation.press(sim.scene.dt, sim.solver.blocks, wp.array(gap, dtype=float), sim.solver.raw)
-    assert (sim.solver.raw.numpy()[: len(x)][closed, :3] == 0.0).all()
-    assert abs(sim.solver.raw.numpy()[: len(x)][~closed, :3]).max() > 0.0
+    v = np.where(closed[:, None], [100.0, -200.0, 300.0], 0.0)
+    _push, full, rate, force = told(sim, v, wp.array(gap, dtype=float))
+    assert (force[closed] == 0.0).all() and abs(force[~closed]).max() > 0.0
+    assert (full[closed] == 0.0).all() and (rate == 0.0).all()
+    assert abs(told(sim, v)[2]).max() > 0.0
 
 
 def test_liquids_keep_what_their_affine_fields_tell():
