@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+import functools
+from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING
 
 from .errors import UserError, quoted, suggestion
@@ -13,9 +14,15 @@ if TYPE_CHECKING:
 ENTRY_POINTS = "fluidbench.solvers"
 
 
+@functools.cache
+def _points() -> tuple[EntryPoint, ...]:
+    """What is registered by what is installed, of which each look reads all metadata."""
+    return tuple(entry_points(group=ENTRY_POINTS))
+
+
 def registered() -> list[str]:
     """Names of all registered methods; loads none of them."""
-    return sorted({point.name for point in entry_points(group=ENTRY_POINTS)})
+    return sorted({point.name for point in _points()})
 
 
 def method_names() -> list[str]:
@@ -38,7 +45,9 @@ def broken() -> dict[str, str]:
 
 def get_method(name: str) -> type[Method]:
     """The method registered under this name; raises UserError with the nearest known name."""
-    for point in entry_points(group=ENTRY_POINTS, name=name):
+    for point in _points():
+        if point.name != name:
+            continue
         try:
             return point.load()
         except Exception as error:  # whatever its package does: the message names it

@@ -57,7 +57,11 @@ Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbenc
 WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="run everything again, whatever is stored")]
 Jobs = Annotated[
-    int | None, typer.Option(min=1, help="runs at a time where timing does not matter; default all cores, or 1 on CUDA")
+    int | None,
+    typer.Option(
+        min=1,
+        help="runs at a time where timing does not matter, and in compare if given; default all cores, or 1 on CUDA",
+    ),
 ]
 Executor = Annotated[
     str | None,

@@ -19,6 +19,7 @@ from typing import Any
 from ..errors import Interrupted, Obstacle, UserError
 from ..files import remove_quietly
 from .checkpoint import CHECKPOINT
+from .interpreter import ALONE, Seat
 from .process import launch, stop_children
 from .record import Record, Run
 from .store import Store, claimed
@@ -59,7 +60,7 @@ def obtain(
     progress: Report | None = None,
     note: Callable[[str], None] = tell,
     begun: Callable[[bool], None] = lambda reused: None,
-    gpu: str = "",
+    seat: Seat = ALONE,
 ) -> Obtained:
     """The result of a piece of work: as it was stored, or made now. Its folder is claimed meanwhile."""
     with claimed(folder, note):
@@ -72,7 +73,7 @@ def obtain(
         if not reuse:
             remove_quietly(folder / CHECKPOINT)
         made = work.forestall(folder)
-        return Obtained(launch(work, folder, progress, gpu) if made is None else made, False, why)
+        return Obtained(launch(work, folder, progress, seat) if made is None else made, False, why)
 
 
 def execute(
@@ -124,9 +125,9 @@ def execute(
             for place, call in calls():
                 ended(place, call())
         elif executor is None:
-            free: SimpleQueue[str] = SimpleQueue()
+            free: SimpleQueue[Seat] = SimpleQueue()
             for gpu in gpus or [""] * workers:
-                free.put(gpu)
+                free.put(Seat(gpu, min(workers, len(places))))
             with ThreadPoolExecutor(workers) as pool:
                 _gather(pool, ((place, _sharing(free, call)) for place, call in calls()), ended, stop_children)
         else:
@@ -136,15 +137,15 @@ def execute(
     return results
 
 
-def _sharing(free: SimpleQueue[str], call: Callable[..., Obtained]) -> Callable[[], Obtained]:
-    """The call with a GPU that no other call has meanwhile."""
+def _sharing(free: SimpleQueue[Seat], call: Callable[..., Obtained]) -> Callable[[], Obtained]:
+    """The call with a seat that no other call has meanwhile."""
 
     def shared() -> Obtained:
-        gpu = free.get()
+        seat = free.get()
         try:
-            return call(gpu=gpu)
+            return call(seat=seat)
         finally:
-            free.put(gpu)
+            free.put(seat)
 
     return shared
 

@@ -4,6 +4,7 @@ import os
 import sys
 import sysconfig
 import threading
+from dataclasses import dataclass
 from pathlib import Path
 
 NOISE = (
@@ -24,14 +25,26 @@ START = (
 )
 
 
-def environment(gpu: str = "") -> dict[str, str]:
+@dataclass(frozen=True)
+class Seat:
+    """Where a child runs: the only GPU that it sees, in the words of CUDA_VISIBLE_DEVICES (all, if none is named), and
+    how many may run at a time."""
+
+    gpu: str = ""
+    of: int = 1
+
+
+ALONE = Seat()
+AT_A_TIME = "FLUIDBENCH_AT_A_TIME"  # tells a child how many may run beside it, itself included
+
+
+def environment(seat: Seat = ALONE) -> dict[str, str]:
     """The environment of a child: never the current folder on its path (PYTHONSAFEPATH), nothing of NOISE, numpy's
-    products on one thread unless told (others spin for cores that are timed), and of the GPUs only the one named, if
-    one is."""
-    kept = {k: v for k, v in os.environ.items() if k not in NOISE} | {"PYTHONSAFEPATH": "1"}
+    products on one thread unless told (others spin for cores that are timed), and its seat."""
+    kept = {k: v for k, v in os.environ.items() if k not in NOISE} | {"PYTHONSAFEPATH": "1", AT_A_TIME: str(seat.of)}
     if not {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"} & set(kept):
         kept["OPENBLAS_NUM_THREADS"] = "1"
-    return kept | ({"CUDA_VISIBLE_DEVICES": gpu} if gpu else {})
+    return kept | ({"CUDA_VISIBLE_DEVICES": seat.gpu} if seat.gpu else {})
 
 
 def search_path() -> list[str]:

@@ -18,7 +18,7 @@ from ..errors import Interrupted, Obstacle, UserError
 from ..files import make_way, write_atomically
 from ..method.target import Target
 from .experiment import Experiment
-from .interpreter import command, end_with_parent, environment
+from .interpreter import ALONE, Seat, command, end_with_parent, environment
 from .job import Job
 from .work import WORK, Report, Work
 
@@ -29,16 +29,15 @@ _children: set[subprocess.Popen] = set()  # that run now, on whatever thread
 OOM_COUNTERS = (Path("/sys/fs/cgroup/memory.events"), Path("/sys/fs/cgroup/memory/memory.oom_control"))
 
 
-def launch(work: Work, folder: Path, progress: Report | None = None, gpu: str = "") -> Any:
+def launch(work: Work, folder: Path, progress: Report | None = None, seat: Seat = ALONE) -> Any:
     """Have a piece of work done in a child process and return its result; whatever happens to the child, there is one.
-    `gpu` is the only one that the child sees, in the words of CUDA_VISIBLE_DEVICES.
 
     Raises Obstacle where a result cannot be written.
     """
     write_atomically(folder / WORK, json.dumps({"kind": type(work).__name__} | asdict(work), indent=1))
     _clear(folder, work)
     kills = _oom_kills()
-    code, timed, obstacle = _attend(work, folder, progress, gpu)
+    code, timed, obstacle = _attend(work, folder, progress, seat)
     if obstacle:
         raise Obstacle(obstacle)
     result = work.left(folder) if code == 0 else None
@@ -62,7 +61,7 @@ def _clear(folder: Path, work: Work) -> None:
             raise Obstacle(f"cannot write {path}: {error.strerror}") from None
 
 
-def _attend(work: Work, folder: Path, progress: Report | None, gpu: str) -> tuple[int, bool, str]:
+def _attend(work: Work, folder: Path, progress: Report | None, seat: Seat) -> tuple[int, bool, str]:
     """Start the child and listen until it ends: (exit code, whether it was stopped for its time, what kept it)."""
     limit = None if work.limit is None else work.limit + GRACE
     timed, obstacle = threading.Event(), ""
@@ -73,7 +72,7 @@ def _attend(work: Work, folder: Path, progress: Report | None, gpu: str) -> tupl
     with log:
         child = subprocess.Popen(
             command("fluidbench.runs.process", str(folder), ATTENDED, python=work.interpreter),
-            env=environment(gpu),
+            env=environment(seat),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,

@@ -13,6 +13,7 @@ from pathlib import Path, PurePath
 from ..method.target import BACKENDS, DEFAULT_BACKEND, Target
 from ..registry import get_method
 from ..scenario.library import reference_tables
+from .interpreter import AT_A_TIME
 
 IDLE = ("cli", "report", "study", "paper", "engines")  # rooms of the toolkit that no run of a native method enters
 KERNELS = "solvers"  # the package of laws and kernels, which methods of others may use, too
@@ -72,6 +73,7 @@ def machine(target: Target) -> dict[str, str]:
         "platform": platform.platform(),
         **hardware(target),
         "load": _load(),
+        "runs_at_a_time": os.environ.get(AT_A_TIME, "1"),
         "time": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
     }
 

@@ -105,6 +105,11 @@ class Record(BaseModel):
         return max(self.binding_s, key=self.binding_s.__getitem__) if self.binding_s else ""
 
     @property
+    def at_a_time(self) -> int:
+        """How many runs of the same study went on beside it at most, itself included."""
+        return int(self.machine.get("runs_at_a_time", "1"))
+
+    @property
     def seconds(self) -> float:
         """What its loop took [s]: CPU time on one core, which other work on the machine leaves as it is; wall time on
         several and on a GPU. NaN where it was not run."""

@@ -60,7 +60,7 @@ def compare(
     one. `frames` keeps a snapshot of every output, `render_every` [simulated s] draws pictures beside the run,
     `checkpoint_every` [wall s] is what a killed run loses at most (0: everything). `measured`: a table of what was
     measured on a real print (CSV), beside what the scenario has of it. `verb` names what is written.
-    `options` are those of every verb, see Options.
+    `options` are those of every verb, see Options; with `jobs` as many run at a time, and the table of costs says so.
 
     Raises UserError for what cannot be run, before anything is.
     """
@@ -91,7 +91,7 @@ def compare(
         film_every=render_every,
         checkpoint_every=checkpoint_every,
     )
-    runs = place.run(planned, verb)
+    runs = place.run(planned, verb, together=options.get("jobs") is not None)
     missing = lacking(runs, refusals=False)
     ok = any(run.ok for run in runs) and not missing
     made = report(runs, place.store.root, verb, beside)

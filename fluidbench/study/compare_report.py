@@ -24,6 +24,7 @@ ADVICE = {
     Verdict.ERROR: "see log.txt in the run's folder",
     Verdict.REFUSED: "change what it refuses, or leave the method out",
 }
+BESIDE = "Some ran beside others (--jobs): a run takes up to 15 % longer so on a core of its own (measured)."
 
 
 def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measured] = ()) -> Report:
@@ -51,6 +52,7 @@ def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measur
         failures=[f"{run.label}: {run.verdict}: {run.reason}; {ADVICE[run.verdict]}" for run in runs if not run.ok],
         notes=[
             *expected,
+            *([BESIDE] if any(run.record.at_a_time > 1 for run in runs) else []),
             *(f"{run.label}: {line}" for run in runs if run.record.repeat == 0 for line in run.record.approximations),
         ],
         images=[*([sketch(first.scenario)] if first else []), *views(runs)],

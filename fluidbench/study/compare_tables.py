@@ -116,6 +116,9 @@ def costs(results: Sequence[Run]) -> Table:
         known = [[r.solves[key] for r in g if key in r.solves] for g in sound.values()]
         table.rows.append([f"viscous solve: {key}", *[spread(values) if values else "-" for values in known]])
     table.rows.append(["binding bound", *[g[0].binding or "-" if g else "-" for g in sound.values()]])
+    beside = [max((r.at_a_time for r in g), default=1) for g in sound.values()]
+    if max(beside, default=1) > 1:
+        table.rows.append(["runs at a time", *map(str, beside)])
     return table
 
 

@@ -41,7 +41,8 @@ class Options(TypedDict, total=False):
     - out: folder for the runs, where a later call finds them; default a temporary one that lives as long as the result
     - fresh: run everything again, whatever is stored
     - wall_limit: how long a run may take [s]; what cannot make it is stopped early
-    - jobs: runs at a time where timing does not matter; default as many as there are cores, or 1 on CUDA
+    - jobs: runs at a time where timing does not matter, and in `compare` if it is given; default as many as there are
+      cores, or 1 on CUDA
     - executor: where runs happen instead of here: anything with the interface of concurrent.futures that reaches the
       same folders, a dask Client, or a name such as "slurm" (runs/cluster.py)
     - progress: whether to show it; default True

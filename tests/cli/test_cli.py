@@ -69,9 +69,21 @@ def test_compare_writes_tables_figures_and_a_self_contained_page(tmp_path):
     for name in ("views", "cross_section", "width", "cost"):
         assert (tmp_path / f"{name}.png").stat().st_size > 5000
     before = {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}
+    assert (table["machine_runs_at_a_time"] == "1").all() and "runs at a time" not in done.stdout
     again = fluidbench("compare", "line_bead", *TINY, "--out", str(tmp_path))
     assert again.returncode == 0
     assert before == {p: p.stat().st_mtime for p in tmp_path.glob("runs/*/record.json")}
+
+
+def test_methods_side_by_side_give_the_same_and_say_so(tmp_path):
+    given = ["compare", "line_bead", *TINY, "--solvers", "mpm,pbd"]
+    alone = fluidbench(*given, "--out", str(tmp_path / "0"))
+    beside = fluidbench(*given, "--jobs", "2", "--out", str(tmp_path / "2"))
+    assert alone.returncode == beside.returncode == 0, beside.stdout + beside.stderr
+    tables = [pd.read_parquet(tmp_path / name / "compare.parquet") for name in ("0", "2")]
+    assert [list(t["machine_runs_at_a_time"]) for t in tables] == [["1", "1"], ["2", "2"]]
+    assert list(tables[0]["bead_width_m"]) == list(tables[1]["bead_width_m"])
+    assert "runs at a time" in beside.stdout and "beside others" in (tmp_path / "2" / "report.html").read_text()
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 14), reason="Taichi has no wheels for Python 3.14")

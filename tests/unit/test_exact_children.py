@@ -99,7 +99,7 @@ def test_what_a_child_says_of_its_run_is_what_became_of_it(tmp_path, monkeypatch
     job, _, launch = launched(tmp_path, monkeypatch, "pass")
     left = Record(**job.heading(), verdict=verdict, reason="as it said", machine=provenance.machine(job.target))
 
-    def attend(job, folder, progress, gpu):
+    def attend(job, folder, progress, seat):
         (folder / "log.txt").write_text("a warning")
         keep(folder, left)
         return 0, False, ""

@@ -97,7 +97,9 @@ def test_children_find_our_code_before_the_users(monkeypatch, tmp_path):
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         monkeypatch.delenv(name, raising=False)
     seen = offspring.environment()
-    assert seen["OPENBLAS_NUM_THREADS"] == "1"
+    assert seen["OPENBLAS_NUM_THREADS"] == "1" and seen[offspring.AT_A_TIME] == "1"
+    seat = offspring.environment(offspring.Seat("GPU-1", 3))
+    assert seat[offspring.AT_A_TIME] == "3" and seat["CUDA_VISIBLE_DEVICES"] == "GPU-1"
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     assert "OPENBLAS_NUM_THREADS" not in offspring.environment()
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
