@@ -1,14 +1,15 @@
 """Where bodies of MPM's matter come together: how far each node lies in a gap that closes (gaps.py).
 
 Matter that is convex fills nodes with masses that are log-concave along any row of them, for so are splines, and what
-they smooth of it. So a node with less than the geometric mean of those on both of its sides lies in a gap,
+they smooth of it. So a node with less than the geometric mean of those on both of its sides lies in a gap or a groove,
 
     g = (1 - m_i / sqrt(m_- m_+) - noise) / SOFT      within 0 and 1, along the axis where it is most
 
-where that mean is at least half of what a full node holds, as on a free surface (more than that counts as full), and
-the sides approach at more than a tenth of the speed with which matter comes there. What lies with a groove between,
-as layers do, approaches more slowly however loaded: it has met. Nodes that a wall, the piston or a body acts on are
-left alone.
+where that mean is at least half of what a full node holds, as on a free surface (more than that counts as full). It is
+a gap if its sides approach at more than a tenth of the speed with which matter comes there: what lies with a groove
+between, as layers do, approaches more slowly however loaded, for it has met. And it is one, however slowly it closes,
+if the eight nodes about it, across that axis, lack something as well, where there is matter on both sides of them:
+beside a groove some do not. Nodes that a wall, the piston or a body acts on are left alone.
 """
 
 import warp as wp
@@ -22,13 +23,14 @@ from .homes import on_grid
 from .particle import ANCHORED
 from .piston import Piston, driven
 from .tied import place_of_node
-from .walls import in_front, near_any
+from .walls import near_any
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 HALF = wp.constant(0.5)
 RANDOM = (11.0 / 20.0) ** 1.5  # by what share nodes differ among particles thrown at random, one a cell: sqrt of the
 # integral of w^2 along each axis
+RANDOM_OF_NINE = 0.08  # what one node in a thousand, and all eight about it, lack among them
 SOFT = wp.constant(0.1)  # lack beyond that from which a gap counts as whole: a sixth of a cell more
 APPROACH = 0.1  # speed of the sides of a gap that closes, over that of what is fed, or of bodies
 EVERY = wp.constant(4)  # substeps from look to look, and at the start of a tick, for nodes may have other numbers then
@@ -38,7 +40,8 @@ EVERY = wp.constant(4)  # substeps from look to look, and at the start of a tick
 class Known:
     """What is known of gaps."""
 
-    noise: float  # by what share a node may lack for want of order
+    noise: float  # by what share a node may lack for want of order,
+    common: float  # and by what share one and all about it
     tied: float  # distance from a body within which nodes or those next to them are tied [m]
     least: wp.array(dtype=float)  # speed at which the sides of a gap approach, per world [m/s]
     beat: wp.array(dtype=int)  # number of the substep,
@@ -60,8 +63,8 @@ def due(known: Known, row: wp.array(dtype=int)):
 
 @wp.func
 def beside(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)):
-    """Momentum and mass of the node at a place, or of the one in front of the wall that it lies behind."""
-    return raw_node(grid, world, on_grid(grid, in_front(grid, node)), table, raw)
+    """Momentum and mass of a node beside one that no wall is next to."""
+    return raw_node(grid, world, on_grid(grid, node), table, raw)
 
 
 @wp.func
@@ -74,18 +77,54 @@ def share_filled(mass: float, full: float):
 
 
 @wp.func
-def lacking(
+def mean_beside(low: float, high: float, full: float):
+    """Geometric mean of what the nodes on both sides hold, over what full ones do; 0 if it is less than HALF."""
+    mean = wp.sqrt(share_filled(low, full) * share_filled(high, full))
+    return wp.where(mean >= HALF, mean, 0.0)
+
+
+@wp.func
+def has_met(
+    grid: Grid,
+    world: int,
+    node: wp.vec3i,
+    axis: int,
+    full: float,
+    noise: float,
+    table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4),
+):
+    """Whether any of the nodes about a node, across an axis, lacks nothing along it."""
+    met = int(0)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    for line in range(int(9)):
+        if met == 0:
+            here = node
+            here[first] = here[first] + line / 3 - 1
+            here[second] = here[second] + line % 3 - 1
+            before = here
+            after = here
+            before[axis] = before[axis] - 1
+            after[axis] = after[axis] + 1
+            low = beside(grid, world, before, table, raw)[3]
+            mean = mean_beside(low, beside(grid, world, after, table, raw)[3], full)
+            if mean > 0.0 and share_filled(beside(grid, world, here, table, raw)[3], full) >= (1.0 - noise) * mean:
+                met = 1
+    return met
+
+
+@wp.func
+def gap_at(
     grid: Grid,
     world: int,
     node: wp.vec3i,
     filled: float,
     full: float,
-    least: float,
+    known: Known,
     table: wp.array(dtype=int),
     raw: wp.array(dtype=wp.vec4),
 ):
-    """By what share a node holds less than the geometric mean of those on its sides, where these approach; the most
-    along any axis."""
+    """g of a node, which holds this share of what full ones do; the most along any axis."""
     most = float(0.0)
     for axis in range(3):
         before = node
@@ -94,11 +133,20 @@ def lacking(
         after[axis] = after[axis] + 1
         low = beside(grid, world, before, table, raw)
         high = beside(grid, world, after, table, raw)
-        mean = wp.sqrt(share_filled(low[3], full) * share_filled(high[3], full))
-        if mean >= HALF:
-            if low[axis] / low[3] - high[axis] / high[3] > least:
-                most = wp.max(most, 1.0 - filled / mean)
-    return most
+        mean = mean_beside(low[3], high[3], full)
+        if mean > 0.0:
+            lack = 1.0 - filled / mean
+            approach = low[axis] / low[3] - high[axis] / high[3]
+            if lack > known.common and approach > 0.0:
+                own = lack - known.noise
+                if approach <= known.least[world]:
+                    own = 0.0
+                wide = lack - known.common
+                if wide > wp.max(most, own):
+                    if has_met(grid, world, node, axis, full, known.common, table, raw) == 0:
+                        own = wide
+                most = wp.max(most, own)
+    return wp.min(most / SOFT, 1.0)
 
 
 @wp.kernel
@@ -133,11 +181,11 @@ def find_gaps(
             full = phases[world, 0].density / grid.inv_volume
         mass = raw[t][3]
         found = float(0.0)
-        if mass > 0.0 and mass < (1.0 - known.noise) * full:
+        if mass > 0.0 and mass < (1.0 - known.common) * full:
             node = corner + wp.vec3i((t & 63) >> 4, (t >> 2) & 3, t & 3)
             if not near_any(grid, node):
-                found = lacking(grid, world, node, mass / full, full, known.least[world], table, raw)
-            if found > known.noise:
+                found = gap_at(grid, world, node, mass / full, full, known, table, raw)
+            if found > 0.0:
                 place = place_of_node(grid, node)
                 if known.tied > 0.0:
                     away, _normal = distance_to(tool, place)
@@ -147,8 +195,8 @@ def find_gaps(
                     v = wp.vec3(raw[t][0], raw[t][1], raw[t][2]) / mass
                     if wp.length_sq(driven(piston, grid, place, v) - v) > 0.0:
                         found = 0.0
-        known.gap[t] = wp.clamp((found - known.noise) / SOFT, 0.0, 1.0)
-        if found > known.noise:
+        known.gap[t] = found
+        if found > 0.0:
             known.seen[slot] = known.beat[0]
         t += step
 

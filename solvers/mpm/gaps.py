@@ -27,7 +27,7 @@ from fluidbench.native.vector_access import load_vec4
 from ..backends import Warp
 from ..tool import Tool
 from . import gap_nodes
-from .gap_nodes import APPROACH, RANDOM, Known, due, find_gaps, with_gaps
+from .gap_nodes import APPROACH, RANDOM, RANDOM_OF_NINE, Known, due, find_gaps, with_gaps
 from .grid import Grid, first_node, node_parts, slots_of, turns
 from .nodes import follow
 from .particle import columns_scaled, contained, kirchhoff, mean_stress, presses_nodes, resistance_of, viscous, weights
@@ -184,7 +184,8 @@ class Gaps:
         known = self.known = Known()
         known.tied = 0.0 if tool is None else (TIED + 1.0) * max(grid.dx)
         self.tool = Tool() if tool is None else tool
-        known.noise = RANDOM * math.sqrt(scene.spacing**3 * grid.inv_volume)
+        disorder = math.sqrt(scene.spacing**3 * grid.inv_volume)
+        known.noise, known.common = RANDOM * disorder, RANDOM_OF_NINE * disorder
         with wp.ScopedDevice(scene.device):
             known.least = wp.array([APPROACH * (s.feeding_speed or s.reference_speed) for s in scene.scenarios], float)
             known.beat, known.number = wp.zeros(1, dtype=int), wp.zeros(1, dtype=int)
@@ -226,5 +227,5 @@ class Gaps:
         self.launch(go_on, self.lanes, some, [self.known, *moved, outdated, pool.fault])
 
     def footprint(self) -> dict[str, int]:
-        fields = Known.vars.keys() - {"noise", "tied"}
+        fields = Known.vars.keys() - {"noise", "common", "tied"}
         return {f"gaps.{name}": getattr(self.known, name).capacity for name in sorted(fields)}
