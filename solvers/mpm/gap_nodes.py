@@ -8,8 +8,8 @@ they smooth of it. So a node with less than the geometric mean of those on both 
 where that mean is at least half of what a full node holds, as on a free surface (more than that counts as full). It is
 a gap if its sides approach at more than a tenth of the speed with which matter comes there: what lies with a groove
 between, as layers do, approaches more slowly however loaded, for it has met. And it is one, however slowly it closes,
-if the eight nodes about it, across that axis, lack something as well, where there is matter on both sides of them:
-beside a groove some do not. Nodes that a wall, the piston or a body acts on are left alone.
+if the eight nodes about it, across that axis, lack something as well, where there is matter on both sides of them, as
+of five at least: beside a groove some do not. Nodes that a wall, the piston or a body acts on are left alone.
 """
 
 import warp as wp
@@ -30,7 +30,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 HALF = wp.constant(0.5)
 RANDOM = (11.0 / 20.0) ** 1.5  # by what share nodes differ among particles thrown at random, one a cell: sqrt of the
 # integral of w^2 along each axis
-RANDOM_OF_NINE = 0.08  # what one node in a thousand, and all eight about it, lack among them
+RANDOM_OF_NINE = 0.2  # what one node in ten thousand, and those about it, lack among them
 SOFT = wp.constant(0.1)  # lack beyond that from which a gap counts as whole: a sixth of a cell more
 APPROACH = 0.1  # speed of the sides of a gap that closes, over that of what is fed, or of bodies
 EVERY = wp.constant(4)  # substeps from look to look, and at the start of a tick, for nodes may have other numbers then
@@ -84,7 +84,7 @@ def mean_beside(low: float, high: float, full: float):
 
 
 @wp.func
-def has_met(
+def is_wide(
     grid: Grid,
     world: int,
     node: wp.vec3i,
@@ -94,8 +94,9 @@ def has_met(
     table: wp.array(dtype=int),
     raw: wp.array(dtype=wp.vec4),
 ):
-    """Whether any of the nodes about a node, across an axis, lacks nothing along it."""
-    met = int(0)
+    """Whether a node and all about it, across an axis, lack something along it, where there is matter on both sides, as
+    there is of six of the nine up to a straight edge."""
+    closed, met = int(0), int(0)
     first, second = (axis + 1) % 3, (axis + 2) % 3
     for line in range(int(9)):
         if met == 0:
@@ -108,9 +109,11 @@ def has_met(
             after[axis] = after[axis] + 1
             low = beside(grid, world, before, table, raw)[3]
             mean = mean_beside(low, beside(grid, world, after, table, raw)[3], full)
-            if mean > 0.0 and share_filled(beside(grid, world, here, table, raw)[3], full) >= (1.0 - noise) * mean:
-                met = 1
-    return met
+            if mean > 0.0:
+                closed += 1
+                if share_filled(beside(grid, world, here, table, raw)[3], full) >= (1.0 - noise) * mean:
+                    met = 1
+    return met == 0 and closed >= 6
 
 
 @wp.func
@@ -143,7 +146,7 @@ def gap_at(
                     own = 0.0
                 wide = lack - known.common
                 if wide > wp.max(most, own):
-                    if has_met(grid, world, node, axis, full, known.common, table, raw) == 0:
+                    if is_wide(grid, world, node, axis, full, known.common, table, raw):
                         own = wide
                 most = wp.max(most, own)
     return wp.min(most / SOFT, 1.0)

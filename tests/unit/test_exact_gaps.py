@@ -130,28 +130,39 @@ def test_a_gap_of_a_twentieth_of_a_cell_is_next_to_none(ratio):
     assert gaps_of(apart(0.05, ratio=ratio)[0]).max() < 0.05
 
 
+def thrown(each, side):
+    """What nodes hold of particles thrown at random, over their mean; periodic."""
+    x = np.random.default_rng(0).uniform(0, side, (int(side**3 * each), 3))
+    base = np.floor(x - 0.5).astype(int)
+    f = x - base
+    w = [0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2]
+    nodes = np.zeros((side,) * 3)
+    for o, q, r in np.ndindex(3, 3, 3):
+        at = tuple((base + np.array((o, q, r))).T % side)
+        np.add.at(nodes, at, w[o][:, 0] * w[q][:, 1] * w[r][:, 2])
+    return nodes / each
+
+
 def test_what_nodes_hold_of_particles_thrown_at_random():
     """Their noise is the least lack that counts: the more particles a cell, the less."""
-    rng, n, side = np.random.default_rng(0), 40_000, 20
     for each in (1.0, 8.0):
-        x = rng.uniform(0, side, (int(n * each), 3))[: int(side**3 * each)]
-        base = np.floor(x - 0.5).astype(int)
-        f = x - base
-        w = [0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2]
-        nodes = np.zeros((side,) * 3)
-        for o, q, r in np.ndindex(3, 3, 3):
-            at = tuple((base + np.array((o, q, r))).T % side)
-            np.add.at(nodes, at, w[o][:, 0] * w[q][:, 1] * w[r][:, 2])
-        assert nodes.std() / nodes.mean() == pytest.approx(RANDOM / np.sqrt(each), rel=0.05)
-        full, common = np.minimum(nodes / nodes.mean(), 1.0), []
-        for axis in range(3):
-            across = [a for a in range(3) if a != axis]
-            lack = 1.0 - full / np.sqrt(np.roll(full, 1, axis) * np.roll(full, -1, axis))
-            common.append(np.min([np.roll(lack, s, across) for s in np.ndindex(3, 3)], axis=0))
-        assert 3e-4 < (np.array(common) > RANDOM_OF_NINE / np.sqrt(each)).mean() < 3e-3
-    sim = apart(1.0, ratio=1.5)[0]
-    assert sim.solver.gaps.known.noise == pytest.approx(RANDOM / 1.5**1.5, rel=0.02)
-    assert sim.solver.gaps.known.common == pytest.approx(RANDOM_OF_NINE / 1.5**1.5, rel=0.02)
+        assert thrown(each, 20).std() == pytest.approx(RANDOM / np.sqrt(each), rel=0.05)
+    known = apart(1.0, ratio=1.5)[0].solver.gaps.known
+    assert known.noise == pytest.approx(RANDOM / 1.5**1.5, rel=0.02)
+    assert known.common == pytest.approx(RANDOM_OF_NINE / 1.5**1.5, rel=0.02)
+
+
+def test_what_nine_nodes_lack_among_particles_thrown_at_random():
+    """As much as counts one node in ten thousand does, and those about it, six of nine with matter on both sides."""
+    full, lacking, axes = np.minimum(thrown(1.0, 60), 1.0), [], (0, 1, 2)
+    for axis in axes:
+        mean = np.sqrt(np.roll(full, 1, axis) * np.roll(full, -1, axis))
+        lack = np.where(mean < 0.5, 1.0, 1.0 - full / np.maximum(mean, 0.5))
+        about = [tuple(np.insert(np.array(s) - 1, axis, 0)) for s in np.ndindex(3, 3)]
+        least = np.min([np.roll(lack, s, axes) for s in about], axis=0)
+        closed = np.sum([np.roll(mean >= 0.5, s, axes) for s in about], axis=0)
+        lacking.append((least > RANDOM_OF_NINE) & (closed >= 6) & (mean >= 0.5))
+    assert 3e-5 < np.mean(lacking) < 3e-4
 
 
 def test_what_a_gap_about_a_node_makes_of_it():
