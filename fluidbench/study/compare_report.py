@@ -24,7 +24,7 @@ ADVICE = {
     Verdict.ERROR: "see log.txt in the run's folder",
     Verdict.REFUSED: "change what it refuses, or leave the method out",
 }
-BESIDE = "Some ran beside others (--jobs): on a core of its own a run takes up to 15 % longer so (measured), else more."
+BESIDE = "Some ran beside others (--jobs): on a core of its own a run took up to a quarter longer so, else more."
 
 
 def report(runs: Sequence[Run], root: Path, verb: str, measured: Sequence[Measured] = ()) -> Report:
