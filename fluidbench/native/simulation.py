@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -182,9 +183,7 @@ class Simulation(Readout):
         self.pool.stale = False
         if on_cpu:  # where replay is free
             start = self.scene.crew.recorded(first, lambda: self._start_tick(*first))
-            self.scene.crew.replay(
-                [(start, 1), (self.scene.crew.recorded(1, lambda: self._substeps(1)), steps.substeps)]
-            )
+            self.scene.crew.replay([(start, 1), *self._recorded(steps.substeps)])
         else:
             whole = *first, steps.substeps
             self.scene.crew.replay([(self.scene.crew.recorded(whole, lambda: self._whole_tick(*whole)), 1)])
@@ -313,13 +312,22 @@ class Simulation(Readout):
             self.substep_launches = max(self.substep_launches, math.ceil(counted.count / number))
 
     def _run(self, substeps: int) -> None:
-        """Replay `substeps` substeps: one graph a substep on the CPU, one for all on CUDA."""
-        if not self._use_graphs:
+        """Replay `substeps` substeps."""
+        if self._use_graphs:
+            self.scene.crew.replay(self._recorded(substeps))
+        else:
             self._launch(substeps)
-            return
-        each = 1 if self.scene.device.is_cpu else substeps
-        graphs = self.scene.crew.recorded(each, lambda: self._substeps(each))
-        self.scene.crew.replay([(graphs, substeps // each)])
+
+    def _recorded(self, substeps: int) -> list[tuple[list[Any], int]]:
+        """The graphs of so many substeps, and how often each: one for all on CUDA; on the CPU, where replay is free, as
+        few substeps in one as the solver takes together."""
+        each = self.solver.together if self.scene.device.is_cpu else substeps
+        portions = [(each, substeps // each), (substeps % each, 1)]
+        found = []
+        for size, times in portions:
+            if size * times > 0:
+                found.append((self.scene.crew.recorded(size, partial(self._substeps, size)), times))
+        return found
 
     def _launch(self, substeps: int) -> None:
         """Launch `substeps` substeps one by one, between those of Warp that came before and come after."""

@@ -42,6 +42,7 @@ class ByBlock:
         active: wp.array,
         dt: wp.array,
         drags: int,
+        anew: float,
         raw: wp.array,
     ) -> None:
         """Find homes anew where particles have moved to others; then scatter, and add up."""
@@ -57,6 +58,7 @@ class ByBlock:
                 self.homes,
                 dt,
                 drags,
+                anew,
                 scene.phases,
                 pool.position,
                 pool.velocity,
@@ -97,6 +99,7 @@ class ByBlock:
     def g2p(
         self,
         grid: Grid,
+        dt: wp.array,
         moving: wp.array,
         shifting: float,
         pitch: float,
@@ -113,7 +116,7 @@ class ByBlock:
                 grid,
                 pool.capacity,
                 self.homes,
-                scene.dt,
+                dt,
                 moving,
                 scene.phases,
                 pool.phase,

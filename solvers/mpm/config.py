@@ -25,4 +25,9 @@ class ConfigMPM(Config):
         "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
     )
     viscous_tolerance: Tolerance = 1e-4
+    kept: Annotated[int, Field(ge=1, le=16)] = Field(
+        1,
+        description="substeps, where matter is fed freely, for which nodes keep their momenta before particles take "
+        "them back",
+    )
     blocks_per_particle: Annotated[float, Field(gt=0, le=8)] = Field(0.5, description="grid blocks to preallocate")

@@ -144,6 +144,7 @@ def go_on(
     lanes: int,
     capacity: int,
     dt: wp.array(dtype=float),
+    substeps: int,
     row: wp.array(dtype=int),
     # outputs
     known: Known,
@@ -156,7 +157,7 @@ def go_on(
     homes: wp.array(dtype=int),
     fault: wp.array(dtype=int),
 ):
-    """The members are faster by that, once they have gathered and moved; and the substep has been."""
+    """The members are faster by that, once they have gathered and moved; and so many substeps have been."""
     lane = index_of(share, wp.tid())
     t, end, step = turns(lane, lanes, known.number[0])
     while t < end:
@@ -172,7 +173,7 @@ def go_on(
         if due(known, row):
             known.last[0] = known.beat[0]
         known.row[0] = row[0]
-        known.beat[0] = known.beat[0] + 1
+        known.beat[0] = known.beat[0] + substeps
 
 
 class Gaps:
@@ -218,12 +219,14 @@ class Gaps:
         given = [pool.count, pool.held, scene.dt, scene.force, scene.phases, *matter, table, moving, row]
         self.launch(keep_own, self.lanes, [self.grid, self.lanes, pool.capacity, *given], [self.known])
 
-    def go_on(self, table: wp.array, block_of: wp.array, active: wp.array, homes: Any) -> None:
-        """Enqueue: let them, once they have."""
+    def go_on(
+        self, dt: wp.array, substeps: int, table: wp.array, block_of: wp.array, active: wp.array, homes: Any
+    ) -> None:
+        """Enqueue: let them, once they have, within dt, with which so many substeps are over."""
         pool, row = self.pool, self.scene.clock.hours.row
         moved = [pool.position, pool.velocity, pool.affine, table, block_of, active]
         outdated = self._nobody if homes is None else homes.outdated
-        some = [self.grid, self.lanes, pool.capacity, self.scene.dt, row]
+        some = [self.grid, self.lanes, pool.capacity, dt, substeps, row]
         self.launch(go_on, self.lanes, some, [self.known, *moved, outdated, pool.fault])
 
     def footprint(self) -> dict[str, int]:

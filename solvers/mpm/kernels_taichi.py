@@ -200,6 +200,7 @@ def passes(alone: bool) -> SimpleNamespace:
         count: Ints,
         dt: Floats,
         drags: int,
+        anew: float,
         phases: Phases,
         position: Vectors,
         velocity: Vectors,
@@ -219,11 +220,11 @@ def passes(alone: bool) -> SimpleNamespace:
         for p in range(position.shape[0]):
             world = p // capacity
             if p - world * capacity < count[world]:
-                h, c = dt[world], affine[p]
+                h, c, m = dt[world], affine[p], anew * mass[p]
                 phase = phase_at(phases, world, phase_of[p])
                 a = mat3(0.0)  # momentum per distance from the particle
                 if held[p] == FREE:
-                    a = mass[p] * c
+                    a = m * c
                 j, b, s = volume_ratio[p], elastic_normal[p], elastic_shear[p]
                 if held[p] != CARRIED and h > 0.0:
                     t = c.trace()
@@ -241,7 +242,7 @@ def passes(alone: bool) -> SimpleNamespace:
                 base = base_node(grid, position[p])
                 f = (position[p] - grid.origin) * grid.inv_dx - base
                 w = weights(f)
-                own = mass[p] * velocity[p]
+                own = m * velocity[p]
                 for o, q in ti.ndrange(3, 3):
                     for r in ti.static(range(3)):
                         at = address(grid, world, wrapped(grid, base + ivec3(o, q, r)), table)
@@ -250,7 +251,7 @@ def passes(alone: bool) -> SimpleNamespace:
                         else:
                             share = w[0, o] * w[1, q] * w[2, r]
                             momentum = share * (own + a @ ((vec3(o, q, r) - f) * grid.dx))
-                            add(raw, at, vec4(momentum[0], momentum[1], momentum[2], share * mass[p]))
+                            add(raw, at, vec4(momentum[0], momentum[1], momentum[2], share * m))
 
     @ti.kernel
     def grid_step(

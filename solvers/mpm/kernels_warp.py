@@ -29,6 +29,7 @@ def p2g(
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
     drags: int,
+    anew: float,
     phases: wp.array2d(dtype=Phase),
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -56,7 +57,7 @@ def p2g(
         p = world * capacity  # threads of a warp stay together
     phase = phases[world, phase_of[p]]
     give(
-        grid, world, dt[world], drags, phase, p, on, position, velocity, affine, mass, volume, held, table,
+        grid, world, dt[world], drags, anew, phase, p, on, position, velocity, affine, mass, volume, held, table,
         volume_ratio, elastic_normal, elastic_shear, plastic, raw, fault,
     )  # fmt: skip
 

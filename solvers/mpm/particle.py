@@ -124,8 +124,8 @@ def stressed(
     plastic: wp.array(dtype=float),
 ):
     """Strain and stress of particle p in a step, kept if it is `on`; what it gives to a node one cell farther along
-    each axis beyond its momentum: the columns of (m C - 4 dt V0 tau / dx^2) dx [kg m/s] (Hu et al. 2018, eq. 18). At
-    dt = 0 nothing is strained."""
+    each axis beyond its momentum, of the mass m, which is 0 where nodes have that: the columns of
+    (m C - 4 dt V0 tau / dx^2) dx [kg m/s] (Hu et al. 2018, eq. 18). At dt = 0 nothing is strained."""
     c = affine[p]
     j = volume_ratio[p]
     b = elastic_normal[p]

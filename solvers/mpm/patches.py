@@ -132,6 +132,7 @@ def scatter(
     homes: Homes,
     dt: wp.array(dtype=float),
     drags: int,
+    anew: float,
     phases: wp.array2d(dtype=Phase),
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -146,7 +147,8 @@ def scatter(
     elastic_shear: wp.array(dtype=wp.vec3),
     plastic: wp.array(dtype=float),
 ):
-    """Strain and stress of each particle, then momentum and mass to the patch of its home."""
+    """Strain and stress of each particle, then momentum and mass, or its push alone (transfers.py), to the patch of
+    its home."""
     h, end = part_of(homes, index_of(share, wp.tid()), lanes)
     while h < end:
         start = h * PATCH
@@ -155,7 +157,7 @@ def scatter(
             p = homes.members[member]
             world = p / capacity
             phase = phases[world, phase_of[p]]
-            m = mass[p]
+            m = anew * mass[p]
             a = stressed(
                 grid,
                 dt[world],

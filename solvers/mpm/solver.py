@@ -18,12 +18,14 @@ from ..flow import plastic_strains
 from ..order import CellOrder
 from ..readout import present_density, pressures, shear_stress
 from . import kernels_warp as kernels
+from .bounds import kept
 from .by_block import ByBlock
 from .chain import Chain
 from .clamp import Clamps
 from .gaps import Gaps
 from .grid import grid_of
 from .implicit import GridViscosity
+from .keeping import Keeping
 from .particle import EXPLICIT, IMPLICIT, PRESSED
 from .piston import piston_of
 from .separation import EVERY, Separation
@@ -88,6 +90,8 @@ class SolverMPM(TraitsMPM):
         self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes, tool) if meets and told else None
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
+        self.together = kept(scene.scenario, config)
+        self.keeping = Keeping(scene, self.node_lanes) if self.together > 1 else None
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
         between = meets or scene.grows or clamps or implicit or self.held is not None  # what a chain leaves out
         self.chain = Chain(self) if not (between or scene.device.is_cpu or backend != "warp") else None
@@ -148,10 +152,28 @@ class SolverMPM(TraitsMPM):
             getattr(self, name)()
 
     def substeps(self, number: int) -> None:
-        if self.chain is None:
+        if self.chain is not None:
+            self.chain.go(number)
+        elif self.keeping is None:
             super().substeps(number)
         else:
-            self.chain.go(number)
+            for first in range(0, number, self.together):
+                self._cycle(self.keeping, min(self.together, number - first))
+
+    def _cycle(self, keeping: Keeping, substeps: int) -> None:
+        """So many of them, between which nodes keep their momenta (keeping.py)."""
+        keeping.begin(substeps)
+        for still in range(substeps - 1, -1, -1):
+            if self.scene.grows:
+                self.swell()
+            if still == substeps - 1:
+                self.clear_grid()
+                self.p2g()
+            else:
+                keeping.keep(self.active, self.moving, self.raw)
+                self.give(self.scene.dt, int(EXPLICIT), self.raw, anew=0.0)
+            self.grid_step()
+            self.take(keeping.none if still else keeping.whole, 0 if still else substeps)
 
     def swell(self) -> None:
         pool = self.pool
@@ -200,11 +222,11 @@ class SolverMPM(TraitsMPM):
             self.empty(dilation.nodes)
             dilation.press(dt, self.blocks, None if self.gaps is None else self.gaps.known.gap, raw)
 
-    def give(self, dt: wp.array, drags: int, raw: wp.array) -> None:
-        """The same, of particles themselves."""
+    def give(self, dt: wp.array, drags: int, raw: wp.array, anew: float = 1.0) -> None:
+        """The same, of particles themselves; or strain and stress alone, to nodes that have momenta and masses."""
         pool, scene = self.pool, self.scene
         if self.by_block is not None:
-            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, dt, drags, raw)
+            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, dt, drags, anew, raw)
             return
         self._launch(
             "p2g",
@@ -215,6 +237,7 @@ class SolverMPM(TraitsMPM):
                 pool.count,
                 dt,
                 drags,
+                anew,
                 scene.phases,
                 pool.position,
                 pool.velocity,
@@ -259,6 +282,10 @@ class SolverMPM(TraitsMPM):
         )
 
     def g2p(self) -> None:
+        self.take(self.scene.dt, 1)
+
+    def take(self, dt: wp.array, substeps: int) -> None:
+        """Velocities and their gradients to particles, which move for dt; so many substeps are over with it."""
         if self.held is not None:
             self.empty(self.held.nodes)
             if self.held.dilation is not None:
@@ -267,17 +294,17 @@ class SolverMPM(TraitsMPM):
         homes = None if self.by_block is None else self.by_block.homes
         if self.gaps is not None:
             self.gaps.keep(self.table, self.moving)
-        self.gather()
+        self.gather(dt)
         if self.gaps is not None:
-            self.gaps.go_on(*self.blocks, homes)
+            self.gaps.go_on(dt, substeps, *self.blocks, homes)
         if self.held is not None:
             self.held.keep_out(self.blocks, homes)
 
-    def gather(self) -> None:
+    def gather(self, dt: wp.array) -> None:
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
         if self.by_block is not None:
             pitch = 0.0 if self.held else scene.spacing
-            self.by_block.g2p(self.grid, self.moving, self.shifting, pitch, *self.blocks)
+            self.by_block.g2p(self.grid, dt, self.moving, self.shifting, pitch, *self.blocks)
             return
         self._launch(
             "g2p",
@@ -286,7 +313,7 @@ class SolverMPM(TraitsMPM):
                 self.grid,
                 pool.capacity,
                 pool.count,
-                scene.dt,
+                dt,
                 self.moving,
                 scene.phases,
                 pool.phase,
@@ -312,7 +339,7 @@ class SolverMPM(TraitsMPM):
         if self.scene.changes:
             self.scene.crew.load(aging)
         self.order.prepare()
-        for part in (self.clamps, self.separation, self.settling, self.gaps, self.chain):
+        for part in (self.clamps, self.separation, self.settling, self.gaps, self.keeping, self.chain):
             if part is not None:
                 part.prepare()
         self.backend.prepare(self)
@@ -360,5 +387,6 @@ class SolverMPM(TraitsMPM):
         more |= {} if self.held is None else self.held.footprint()
         more |= {} if self.separation is None else self.separation.footprint()
         more |= {} if self.gaps is None else self.gaps.footprint()
+        more |= {} if self.keeping is None else self.keeping.footprint()
         more |= {} if self.chain is None else self.chain.footprint()
         return {name: getattr(self, name).capacity for name in names} | more | footprint_of(self.viscosity)

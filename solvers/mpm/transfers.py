@@ -20,6 +20,7 @@ def give(
     world: int,
     dt: float,
     drags: int,
+    anew: float,
     phase: Phase,
     p: int,
     active: bool,
@@ -37,9 +38,10 @@ def give(
     raw: wp.array(dtype=wp.vec4),
     fault: wp.array(dtype=int),
 ):
-    """Strain and stress of particle p, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18). On a GPU
-    the whole warp must ask; one that is not `active` computes, but writes nothing."""
-    m = mass[p]
+    """Strain and stress of particle p, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18), all of it
+    where these are told `anew` (1), else (0) what its stress changes them by. On a GPU the whole warp must ask; one
+    that is not `active` computes, but writes nothing."""
+    m = anew * mass[p]
     x = wp.where(active, position[p], 0.5 * (grid.lower + grid.upper))
     a = stressed(
         grid,

@@ -1,0 +1,73 @@
+"""Where matter is fed freely, nodes of MPM can keep their momenta for some substeps, before particles take them back.
+
+Each exchange between particles and nodes costs something, however short the substep: what is carried gives the nodes
+below the outlet its momentum anew, which presses as a lower one would; and a step of APIC leaves velocities that
+are no longer linear at a free surface by some hundredths of u'' dx^2. So what is laid got wider with the number of
+substeps, that is, with the speed of sound. A cycle of them is one Lagrangian step of the grid, as the material point
+method has it: particles stay where they are, strain and push, and nodes go on with
+
+    m_i v_i += dt f_i(tau),   f_i and tau at the places that the cycle began with,
+
+until at its end particles take velocities and move, by the whole time. For each substep within it the equations are
+those of a finite element grid: the bounds on dt are the same, momentum is kept to the bit.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from fluidbench.native.crew import index_of
+from fluidbench.native.scene import Scene
+
+from .grid import turns
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+
+@wp.kernel
+def keep(
+    share: wp.vec3i,
+    lanes: int,
+    active: wp.array(dtype=int),
+    moving: wp.array(dtype=wp.vec4),
+    # outputs
+    raw: wp.array(dtype=wp.vec4),
+):
+    """Momenta of nodes from the velocities that they have come to; their masses stay."""
+    t, end, step = turns(index_of(share, wp.tid()), lanes, wp.min(active[0] * 64, raw.shape[0]))
+    while t < end:
+        m, v = raw[t][3], moving[t]
+        raw[t] = wp.vec4(m * v[0], m * v[1], m * v[2], m)
+        t += step
+
+
+@wp.kernel
+def last(dt: wp.array(dtype=float), substeps: int, whole: wp.array(dtype=float)):
+    """How long so many substeps last [s], in every world."""
+    world = wp.tid()
+    whole[world] = dt[world] * float(substeps)
+
+
+class Keeping:
+    """What keeping momenta allocates, and its launches, which are Warp's whatever the solver's language."""
+
+    def __init__(self, scene: Scene, lanes: int) -> None:
+        """`lanes` are the threads that go through nodes."""
+        self.scene, self.lanes = scene, lanes
+        with wp.ScopedDevice(scene.device):
+            self.whole, self.none = wp.zeros_like(scene.dt), wp.zeros_like(scene.dt)
+
+    def prepare(self) -> None:
+        self.scene.crew.load(__name__)
+
+    def begin(self, substeps: int) -> None:
+        """Enqueue: a cycle of so many substeps."""
+        self.scene.crew.launch(last, self.scene.worlds, [self.scene.dt, substeps], [self.whole])
+
+    def keep(self, active: wp.array, moving: wp.array, raw: wp.array) -> None:
+        """Enqueue: what nodes begin the next substep with."""
+        self.scene.crew.launch(keep, self.lanes, [self.lanes, active, moving], [raw])
+
+    def footprint(self) -> dict[str, int]:
+        names: Any = ("whole", "none")
+        return {f"keeping.{name}": getattr(self, name).capacity for name in names}

@@ -1,0 +1,97 @@
+"""Nodes of MPM that keep their momenta between substeps: momentum, bits, both languages, and what it is for."""
+
+import numpy as np
+import pytest
+
+from fluidbench.method.target import HERE, Target
+from fluidbench.method.timestep import plan
+from fluidbench.native.simulation import Simulation
+from fluidbench.scenario.numerics import configure
+from solvers.mpm import SolverMPM
+from solvers.mpm.bounds import bounds_of, kept
+
+from ..conftest import PERIODIC, bead, drive
+
+PASTE = {"density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "yield_stress": 60.0}
+
+
+def keeping(number=4, make=bead, **table):
+    return make(numerics={"mpm": {"kept": number}}, **table)
+
+
+def final(given, target=HERE):
+    sim = Simulation(given, "mpm", target)
+    sim.prepare()
+    drive(sim)
+    return sim.frame()
+
+
+def test_momentum_and_its_moment_are_kept():
+    ball = {"kind": "sphere", "center": [-0.02, -0.02, 0.025], "radius": 0.008}
+    domain = {"lower": [-0.05] * 3, "upper": [0.05] * 3, "walls": PERIODIC}
+    given = keeping(material=PASTE, bodies=[ball], gravity=[0, 0, 0], domain=domain, duration=0.1)
+    sim = Simulation(given, "mpm")
+    sim.prepare()
+    sim.begin()
+    free = sim.frame()["held"] == 0
+    x = sim.frame()["position"][free]
+    kick = np.zeros_like(sim.pool.velocity.numpy())
+    x = x - x.mean(axis=0)
+    kick[: len(x)] = np.cross([3.0, 1.0, 2.0], x) + 0.02 * np.sin(400.0 * x[:, ::-1])
+    sim.kick(kick)
+
+    def moments():
+        frame = sim.frame()
+        m, x, v = frame["mass"][free, None], frame["position"][free], frame["velocity"][free]
+        return (m * v).sum(axis=0), (m * np.cross(x, v)).sum(axis=0) + frame["spin"][free].sum(axis=0)
+
+    sim.march(1e-5, 1)  # spins come with the first exchange
+    before, size = moments(), float(np.abs(sim.frame()["mass"] @ np.abs(sim.frame()["velocity"])).max())
+    sim.march(1e-4, 42)  # ten whole cycles, and half of one
+    after = moments()
+    assert after[0] == pytest.approx(before[0], abs=2e-6 * size)
+    assert after[1] == pytest.approx(before[1], abs=1e-3 * float(np.abs(before[1]).max()))
+
+
+def test_the_bits_are_the_same_on_two_threads():
+    one, two = (final(keeping(duration=0.05), Target(threads=n)) for n in (1, 2))
+    assert all((one[name] == two[name]).all() for name in ("position", "velocity", "density"))
+
+
+def test_taichi_does_the_same():
+    pytest.importorskip("taichi")
+    warp, taichi = (final(keeping(duration=0.03), Target(backend=name)) for name in ("warp", "taichi"))
+    assert np.abs(warp["position"] - taichi["position"]).max() < 0.02 * 0.002
+
+
+def test_a_substep_may_move_matter_by_less_where_particles_wait():
+    for number, given in ((1, keeping(1)), (4, keeping(4))):
+        config = configure(SolverMPM, given)
+        bound = {b.name: b.dt for b in bounds_of(given, config, 2.0)}
+        assert bound["advective"] * 2.0 * number == pytest.approx(0.5 * 2.0 * given.spacing, rel=0.1)
+        assert plan(bounds_of(given, config, 0.1), 0.01).binding.name == "acoustic"
+
+
+def test_where_nodes_keep_nothing():
+    flat = {"diameter": 0.012, "exit_speed": 0.1, "standoff": 0.010, "tip": "flat"}
+    clamped = {"kind": "box", "center": [0.0, 0.0, 0.004], "size": [0.008] * 3, "clamped": True}
+    for given in (
+        keeping(nozzle=flat, domain={"lower": [-0.03, -0.03, 0.0], "upper": [0.06, 0.03, 0.05]}),
+        keeping(bodies=[clamped]),
+        keeping(nozzle=None, toolpath=None, bodies=[clamped | {"clamped": False}]),
+    ):
+        assert kept(given, configure(SolverMPM, given)) == 1
+    assert kept(keeping(), configure(SolverMPM, keeping())) == 4
+
+
+def test_what_counts_is_the_number_of_exchanges_and_not_of_substeps():
+    """Width of what is pressed under an outlet, with a quarter of the shipped step."""
+
+    def width(number, safety):
+        given = bead(duration=0.3, numerics={"mpm": {"kept": number, "safety": safety}})
+        y = final(given)["position"][:, 1]
+        return float(np.quantile(y, 0.98) - np.quantile(y, 0.02))
+
+    shipped, often, kept_four = width(1, 0.8), width(1, 0.2), width(4, 0.2)
+    assert often > shipped + 5e-4
+    assert abs(kept_four - shipped) < 0.5 * (often - shipped)
