@@ -12,8 +12,6 @@ until at its end particles take velocities and move, by the whole time. For each
 those of a finite element grid: the bounds on dt are the same, momentum is kept to the bit.
 """
 
-from typing import Any
-
 import warp as wp
 
 from fluidbench.native.crew import index_of
@@ -69,5 +67,4 @@ class Keeping:
         self.scene.crew.launch(keep, self.lanes, [self.lanes, active, moving], [raw])
 
     def footprint(self) -> dict[str, int]:
-        names: Any = ("whole", "none")
-        return {f"keeping.{name}": getattr(self, name).capacity for name in names}
+        return {"keeping.whole": self.whole.capacity, "keeping.none": self.none.capacity}
