@@ -24,8 +24,8 @@ class Solver(Method):
     passes: ClassVar[tuple[str, ...]]
     faults: ClassVar[dict[int, str]] = {}
     arranges: int = 0  # ticks from one call of `arrange` to the next; 0 for never
-    together: int = 1  # substeps that are best enqueued as one
     turns: int = 1  # calls of `arrange` until it does the same again
+    together: int = 1  # substeps that are best enqueued as one
     sort_bits: int = 64  # of its sort keys, from the lowest on, that tell any two apart
     makes_room: bool = False  # whether it must be told when particles were put where others may be
     backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched

@@ -8,7 +8,8 @@ and the push of its own stress, in place of the mean of all,
 
     v_ip = v_i + g (v_p + (C_p - 4 dt V0 tau / (m_p dx^2)) (x_i - x_p) + dt force - v_i)
 
-The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. Through
+The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. (Where
+nodes keep theirs for a cycle of substeps, v_p, C_p are those it began with, and pushes those of all since.) Through
 such nodes nothing pushes, drags or strains. (Beside a body pressure of what is elastic is no part of tau, but acts by
 way of nodes that are in no gap: dilation.py.)
 """
@@ -68,11 +69,13 @@ def keep_own(
     table: wp.array(dtype=int),
     moving: wp.array(dtype=wp.vec4),
     row: wp.array(dtype=int),
+    number: int,
     # outputs
     known: Known,
 ):
     """By what who has nodes in blocks with gaps will be faster than what it gathers; after strain, before motion. Who
-    that is is found among all where gaps were looked for, and known from then on."""
+    that is is found among all where gaps were looked for, and known from then on. `number`: of the substep in its
+    cycle, from 0 on."""
     anew = due(known, row)
     many, look = int(known.number[0]), int(known.last[0])
     if anew:
@@ -108,8 +111,14 @@ def keep_own(
                 tau = kirchhoff(phase, mean, elastic_normal[p], elastic_shear[p])
                 if phase.viscosity > 0.0:
                     tau += viscous(phase, volume_ratio[p], affine[p])
-                a = columns_scaled(affine[p], grid.dx) - resistance_of(grid, dt[world], volume[p], tau) / mass[p]
-                v = velocity[p] + dt[world] * force_at(force[world], position[p])
+                v = velocity[p]
+                a = columns_scaled(affine[p], grid.dx)
+                if number > 0:  # not anew: members are those of the cycle's first substep
+                    v = known.begun[t]
+                    a = known.pushed[t]
+                begun = v
+                a -= resistance_of(grid, dt[world], volume[p], tau) / mass[p]
+                v += (float(number + 1) * dt[world]) * force_at(force[world], position[p])
                 more, turn = wp.vec3(0.0, 0.0, 0.0), wp.mat33(0.0)
                 for o in range(3):
                     for q in range(3):
@@ -132,6 +141,9 @@ def keep_own(
                 if anew:
                     member = drawn(known.number, 0)
                     known.members[member] = p
+                if known.begun.shape[0] > 0:
+                    known.begun[member] = begun
+                    known.pushed[member] = a
                 known.faster[member] = more
                 known.bent[member] = columns_scaled(turn, 4.0 * grid.inv_dx)
         t += step
@@ -179,8 +191,9 @@ def go_on(
 class Gaps:
     """What keeping bodies apart allocates, and its launches, which are Warp's whatever the solver's language."""
 
-    def __init__(self, scene: Scene, pool: Pool, grid: Grid, slots: int, lanes: int, tool: Any) -> None:
-        """`tool` is a body that ties nodes, or None; for `slots` and `lanes` see tied.py."""
+    def __init__(self, scene: Scene, pool: Pool, grid: Grid, slots: int, lanes: int, tool: Any, cycles: bool) -> None:
+        """`tool` is a body that ties nodes, or None; `cycles`: whether nodes keep their momenta; for `slots` and
+        `lanes` see tied.py."""
         self.scene, self.pool, self.grid, self.lanes = scene, pool, grid, lanes
         known = self.known = Known()
         known.tied = 0.0 if tool is None else (TIED + 1.0) * max(grid.dx)
@@ -194,6 +207,8 @@ class Gaps:
             known.gap, known.seen = wp.zeros(slots * 64, dtype=float), wp.full(slots, -1, dtype=int)
             known.members, known.faster = wp.zeros(pool.size, dtype=int), wp.zeros(pool.size, dtype=wp.vec3)
             known.bent = wp.zeros(pool.size, dtype=wp.mat33)
+            many = pool.size if cycles else 0
+            known.begun, known.pushed = wp.zeros(many, dtype=wp.vec3), wp.zeros(many, dtype=wp.mat33)
             self._nobody = wp.zeros(1, dtype=int)
         self.launch = Warp(scene.crew).launch
 
@@ -211,12 +226,13 @@ class Gaps:
         nodes = [active, block_of, table, raw, self.scene.phases, piston, self.tool, row]
         self.launch(find_gaps, self.lanes, [*lanes, *nodes], [self.known])
 
-    def keep(self, table: wp.array, moving: wp.array) -> None:
-        """Enqueue: what particles that have nodes in gaps would keep; before they gather and move."""
+    def keep(self, table: wp.array, moving: wp.array, number: int) -> None:
+        """Enqueue: what particles that have nodes in gaps would keep in the number-th substep of a cycle, from 0 on;
+        before they gather and move."""
         pool, scene, row = self.pool, self.scene, self.scene.clock.hours.row
         matter = [pool.phase, pool.position, pool.velocity, pool.affine, pool.mass, pool.volume]
         matter += [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear]
-        given = [pool.count, pool.held, scene.dt, scene.force, scene.phases, *matter, table, moving, row]
+        given = [pool.count, pool.held, scene.dt, scene.force, scene.phases, *matter, table, moving, row, number]
         self.launch(keep_own, self.lanes, [self.grid, self.lanes, pool.capacity, *given], [self.known])
 
     def go_on(

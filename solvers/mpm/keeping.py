@@ -9,15 +9,22 @@ method has it: particles stay where they are, strain and push, and nodes go on w
     m_i v_i += dt f_i(tau),   f_i and tau at the places that the cycle began with,
 
 until at its end particles take velocities and move, by the whole time. For each substep within it the equations are
-those of a finite element grid: the bounds on dt are the same, momentum is kept to the bit.
+those of a finite element grid: the bounds on dt are the same, and momentum is kept.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import warp as wp
 
 from fluidbench.native.crew import index_of
-from fluidbench.native.scene import Scene
 
 from .grid import turns
+from .particle import EXPLICIT
+
+if TYPE_CHECKING:
+    from .solver import SolverMPM
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -47,24 +54,38 @@ def last(dt: wp.array(dtype=float), substeps: int, whole: wp.array(dtype=float))
 
 
 class Keeping:
-    """What keeping momenta allocates, and its launches, which are Warp's whatever the solver's language."""
+    """What keeping momenta allocates, and its launches; `keep` and `last` are Warp's whatever the solver's language."""
 
-    def __init__(self, scene: Scene, lanes: int) -> None:
-        """`lanes` are the threads that go through nodes."""
-        self.scene, self.lanes = scene, lanes
-        with wp.ScopedDevice(scene.device):
-            self.whole, self.none = wp.zeros_like(scene.dt), wp.zeros_like(scene.dt)
+    def __init__(self, solver: SolverMPM) -> None:
+        self.solver = solver
+        self.whole, self.none = wp.zeros_like(solver.scene.dt), wp.zeros_like(solver.scene.dt)
 
     def prepare(self) -> None:
-        self.scene.crew.load(__name__)
+        self.solver.scene.crew.load(__name__)
 
-    def begin(self, substeps: int) -> None:
-        """Enqueue: a cycle of so many substeps."""
-        self.scene.crew.launch(last, self.scene.worlds, [self.scene.dt, substeps], [self.whole])
+    def go(self, substeps: int) -> None:
+        """Enqueue so many substeps, in cycles."""
+        for first in range(0, substeps, self.solver.together):
+            self._cycle(min(self.solver.together, substeps - first))
 
-    def keep(self, active: wp.array, moving: wp.array, raw: wp.array) -> None:
-        """Enqueue: what nodes begin the next substep with."""
-        self.scene.crew.launch(keep, self.lanes, [self.lanes, active, moving], [raw])
+    def _cycle(self, substeps: int) -> None:
+        solver, scene = self.solver, self.solver.scene
+        scene.crew.launch(last, scene.worlds, [scene.dt, substeps], [self.whole])
+        for number in range(substeps):
+            if scene.grows:
+                solver.swell()
+            if number == 0:
+                solver.clear_grid()
+                solver.p2g()
+            else:
+                nodes = [solver.node_lanes, solver.active, solver.moving]
+                scene.crew.launch(keep, solver.node_lanes, nodes, [solver.raw])
+                solver.give(scene.dt, int(EXPLICIT), solver.raw, anew=0.0)
+            solver.grid_step()
+            if number < substeps - 1:
+                solver.take(self.none, number, 0)
+            else:
+                solver.take(self.whole, number, substeps)
 
     def footprint(self) -> dict[str, int]:
         return {"keeping.whole": self.whole.capacity, "keeping.none": self.none.capacity}

@@ -87,11 +87,13 @@ class SolverMPM(TraitsMPM):
         meets = any(scenario.emits or len(scenario.bodies) > 1 for scenario in scene.scenarios)
         told = not (implicit or scene.expands)  # whose push is whose, and by its mass how full a node is
         tool = None if self.held is None else self.held.tool
-        self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes, tool) if meets and told else None
+        self.together = kept(scene.scenario, config)
+        self.gaps = None
+        if meets and told:
+            self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes, tool, self.together > 1)
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
-        self.together = kept(scene.scenario, config)
-        self.keeping = Keeping(scene, self.node_lanes) if self.together > 1 else None
+        self.keeping = Keeping(self) if self.together > 1 else None
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
         between = meets or scene.grows or clamps or implicit or self.held is not None  # what a chain leaves out
         self.chain = Chain(self) if not (between or scene.device.is_cpu or backend != "warp") else None
@@ -152,28 +154,11 @@ class SolverMPM(TraitsMPM):
             getattr(self, name)()
 
     def substeps(self, number: int) -> None:
-        if self.chain is not None:
-            self.chain.go(number)
-        elif self.keeping is None:
+        way = self.chain or self.keeping
+        if way is None:
             super().substeps(number)
         else:
-            for first in range(0, number, self.together):
-                self._cycle(self.keeping, min(self.together, number - first))
-
-    def _cycle(self, keeping: Keeping, substeps: int) -> None:
-        """So many of them, between which nodes keep their momenta (keeping.py)."""
-        keeping.begin(substeps)
-        for still in range(substeps - 1, -1, -1):
-            if self.scene.grows:
-                self.swell()
-            if still == substeps - 1:
-                self.clear_grid()
-                self.p2g()
-            else:
-                keeping.keep(self.active, self.moving, self.raw)
-                self.give(self.scene.dt, int(EXPLICIT), self.raw, anew=0.0)
-            self.grid_step()
-            self.take(keeping.none if still else keeping.whole, 0 if still else substeps)
+            way.go(number)
 
     def swell(self) -> None:
         pool = self.pool
@@ -282,10 +267,11 @@ class SolverMPM(TraitsMPM):
         )
 
     def g2p(self) -> None:
-        self.take(self.scene.dt, 1)
+        self.take(self.scene.dt, 0, 1)
 
-    def take(self, dt: wp.array, substeps: int) -> None:
-        """Velocities and their gradients to particles, which move for dt; so many substeps are over with it."""
+    def take(self, dt: wp.array, number: int, over: int) -> None:
+        """Velocities and their gradients to particles, which move for dt, in the number-th substep of a cycle, from 0
+        on; so many are `over` with it."""
         if self.held is not None:
             self.empty(self.held.nodes)
             if self.held.dilation is not None:
@@ -293,10 +279,10 @@ class SolverMPM(TraitsMPM):
             self.held.level(self.table, self.piston, self.moving)
         homes = None if self.by_block is None else self.by_block.homes
         if self.gaps is not None:
-            self.gaps.keep(self.table, self.moving)
+            self.gaps.keep(self.table, self.moving, number)
         self.gather(dt)
         if self.gaps is not None:
-            self.gaps.go_on(dt, substeps, *self.blocks, homes)
+            self.gaps.go_on(dt, over, *self.blocks, homes)
         if self.held is not None:
             self.held.keep_out(self.blocks, homes)
 
