@@ -43,6 +43,7 @@ class ByBlock:
         dt: wp.array,
         drags: int,
         anew: float,
+        bent: wp.array,
         raw: wp.array,
     ) -> None:
         """Find homes anew where particles have moved to others; then scatter, and add up."""
@@ -67,6 +68,7 @@ class ByBlock:
                 pool.volume,
                 pool.phase,
                 pool.held,
+                bent,
             ],
             self.strains,
         )
@@ -99,7 +101,7 @@ class ByBlock:
     def g2p(
         self,
         grid: Grid,
-        dt: wp.array,
+        moves: float,
         moving: wp.array,
         shifting: float,
         pitch: float,
@@ -116,7 +118,8 @@ class ByBlock:
                 grid,
                 pool.capacity,
                 self.homes,
-                dt,
+                scene.dt,
+                moves,
                 moving,
                 scene.phases,
                 pool.phase,

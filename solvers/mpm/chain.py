@@ -65,12 +65,12 @@ def g2p2g(
     phase = phases[world, phase_of[p]]
     if on:
         take(
-            grid, world, dt[world], moving, phase, p, held, shifting, 0.0, row, exit,
+            grid, world, dt[world], 1.0, moving, phase, p, held, shifting, 0.0, row, exit,
             position, velocity, affine, volume_ratio, table, block_of, active, fault,
         )  # fmt: skip
     give(
-        grid, world, dt[world], EXPLICIT, 1.0, phase, p, on, position, velocity, affine, mass, volume, held, table,
-        volume_ratio, elastic_normal, elastic_shear, plastic, raw, fault,
+        grid, world, dt[world], EXPLICIT, 1.0, phase, p, on, position, velocity, affine, mass, volume, held, affine,
+        table, volume_ratio, elastic_normal, elastic_shear, plastic, raw, fault,
     )  # fmt: skip
 
 
@@ -100,7 +100,7 @@ class Chain:
             self._take_and_give(there)
             here, there = there, here
         solver.walled(here, solver.scene.force, solver.piston, solver.moving)
-        solver.gather(solver.scene.dt)
+        solver.gather(1, 1.0)
 
     def _take_and_give(self, nodes: wp.array) -> None:
         solver, scene, pool = self.solver, self.solver.scene, self.solver.pool

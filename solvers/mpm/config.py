@@ -25,7 +25,7 @@ class ConfigMPM(Config):
         "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
     )
     viscous_tolerance: Tolerance = 1e-4
-    kept: Annotated[int, Field(ge=1, le=16)] = Field(
+    kept: Annotated[int, Field(ge=1, le=64)] = Field(
         1,
         description="substeps, where matter is fed freely, for which nodes keep their momenta before particles take "
         "them back",

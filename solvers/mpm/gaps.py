@@ -31,7 +31,17 @@ from . import gap_nodes
 from .gap_nodes import APPROACH, RANDOM, RANDOM_OF_NINE, Known, due, find_gaps, with_gaps
 from .grid import Grid, first_node, node_parts, slots_of, turns
 from .nodes import follow
-from .particle import columns_scaled, contained, kirchhoff, mean_stress, presses_nodes, resistance_of, viscous, weights
+from .particle import (
+    as_begun,
+    columns_scaled,
+    contained,
+    kirchhoff,
+    mean_stress,
+    presses_nodes,
+    resistance_of,
+    viscous,
+    weights,
+)
 from .tied import TIED
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -70,12 +80,13 @@ def keep_own(
     moving: wp.array(dtype=wp.vec4),
     row: wp.array(dtype=int),
     number: int,
+    bent: wp.array(dtype=wp.mat33),
     # outputs
     known: Known,
 ):
     """By what who has nodes in blocks with gaps will be faster than what it gathers; after strain, before motion. Who
     that is is found among all where gaps were looked for, and known from then on. `number`: of the substep in its
-    cycle, from 0 on."""
+    cycle, from 0 on; `bent`: by how much matter has been since (keeping.py)."""
     anew = due(known, row)
     many, look = int(known.number[0]), int(known.last[0])
     if anew:
@@ -117,7 +128,10 @@ def keep_own(
                     v = known.begun[t]
                     a = known.pushed[t]
                 begun = v
-                a -= resistance_of(grid, dt[world], volume[p], tau) / mass[p]
+                push = resistance_of(grid, dt[world], volume[p], tau) / mass[p]
+                if number > 0:
+                    push = as_begun(grid, push, bent[p])
+                a -= push
                 v += (float(number + 1) * dt[world]) * force_at(force[world], position[p])
                 more, turn = wp.vec3(0.0, 0.0, 0.0), wp.mat33(0.0)
                 for o in range(3):
@@ -156,6 +170,7 @@ def go_on(
     lanes: int,
     capacity: int,
     dt: wp.array(dtype=float),
+    moves: float,
     substeps: int,
     row: wp.array(dtype=int),
     # outputs
@@ -178,7 +193,7 @@ def go_on(
         x = position[p]
         velocity[p] = velocity[p] + known.faster[t]
         affine[p] = affine[p] + known.bent[t]
-        position[p] = contained(grid, x + dt[world] * known.faster[t])
+        position[p] = contained(grid, x + (moves * dt[world]) * known.faster[t])
         follow(grid, world, x, position[p], table, block_of, active, homes, fault)
         t += step
     if lane == 0:
@@ -226,23 +241,23 @@ class Gaps:
         nodes = [active, block_of, table, raw, self.scene.phases, piston, self.tool, row]
         self.launch(find_gaps, self.lanes, [*lanes, *nodes], [self.known])
 
-    def keep(self, table: wp.array, moving: wp.array, number: int) -> None:
-        """Enqueue: what particles that have nodes in gaps would keep in the number-th substep of a cycle, from 0 on;
-        before they gather and move."""
+    def keep(self, table: wp.array, moving: wp.array, number: int, bent: wp.array) -> None:
+        """Enqueue: what particles that have nodes in gaps would keep in the number-th substep of a cycle, from 0 on,
+        `bent` since that began (keeping.py); before they gather and move."""
         pool, scene, row = self.pool, self.scene, self.scene.clock.hours.row
         matter = [pool.phase, pool.position, pool.velocity, pool.affine, pool.mass, pool.volume]
         matter += [pool.volume_ratio, pool.elastic_normal, pool.elastic_shear]
-        given = [pool.count, pool.held, scene.dt, scene.force, scene.phases, *matter, table, moving, row, number]
+        given = [pool.count, pool.held, scene.dt, scene.force, scene.phases, *matter, table, moving, row, number, bent]
         self.launch(keep_own, self.lanes, [self.grid, self.lanes, pool.capacity, *given], [self.known])
 
     def go_on(
-        self, dt: wp.array, substeps: int, table: wp.array, block_of: wp.array, active: wp.array, homes: Any
+        self, moves: float, substeps: int, table: wp.array, block_of: wp.array, active: wp.array, homes: Any
     ) -> None:
-        """Enqueue: let them, once they have, within dt, with which so many substeps are over."""
+        """Enqueue: let them, once they have, if they move (1; else 0); so many substeps are over with it."""
         pool, row = self.pool, self.scene.clock.hours.row
         moved = [pool.position, pool.velocity, pool.affine, table, block_of, active]
         outdated = self._nobody if homes is None else homes.outdated
-        some = [self.grid, self.lanes, pool.capacity, dt, substeps, row]
+        some = [self.grid, self.lanes, pool.capacity, self.scene.dt, moves, substeps, row]
         self.launch(go_on, self.lanes, some, [self.known, *moved, outdated, pool.fault])
 
     def footprint(self) -> dict[str, int]:

@@ -119,6 +119,7 @@ def g2p(
     capacity: int,
     count: Ints,
     dt: Floats,
+    moves: float,
     moving: Quads,
     phases: Phases,
     phase_of: Ints,
@@ -158,7 +159,7 @@ def g2p(
                 ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] + 0.5 * pitch - x[2]) - v[2]
                 left = ti.math.clamp(1.0 + ahead / v[2], 1.0 / PACKED, PACKED)
                 volume_ratio[p] += ti.min(-v[2] * h / pitch, 1.0) * (left - volume_ratio[p])
-            free = x + h * v
+            free = x + moves * h * v
             if too_fast(v, grid.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)
                 free = position[p]
@@ -209,6 +210,7 @@ def passes(alone: bool) -> SimpleNamespace:
         volume: Floats,
         phase_of: Ints,
         held: Ints,
+        bent: Matrices,
         table: Ints,
         volume_ratio: Floats,
         elastic_normal: Vectors,
@@ -238,6 +240,8 @@ def passes(alone: bool) -> SimpleNamespace:
                     tau = kirchhoff(phase, j, b, s)
                     if drags == 1 and phase.viscosity > 0.0:
                         tau += viscous(phase, j, c)
+                    if anew == 0.0:
+                        tau = tau @ (ti.Matrix.identity(ti.f32, 3) + bent[p]).inverse().transpose()
                     a -= resistance_of(grid, h, volume[p], tau)
                 base = base_node(grid, position[p])
                 f = (position[p] - grid.origin) * grid.inv_dx - base

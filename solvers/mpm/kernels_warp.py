@@ -38,6 +38,7 @@ def p2g(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
+    bent: wp.array(dtype=wp.mat33),
     table: wp.array(dtype=int),
     # outputs
     volume_ratio: wp.array(dtype=float),
@@ -57,7 +58,7 @@ def p2g(
         p = world * capacity  # threads of a warp stay together
     phase = phases[world, phase_of[p]]
     give(
-        grid, world, dt[world], drags, anew, phase, p, on, position, velocity, affine, mass, volume, held, table,
+        grid, world, dt[world], drags, anew, phase, p, on, position, velocity, affine, mass, volume, held, bent, table,
         volume_ratio, elastic_normal, elastic_shear, plastic, raw, fault,
     )  # fmt: skip
 
@@ -123,6 +124,7 @@ def g2p(
     capacity: int,
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
+    moves: float,
     moving: wp.array(dtype=wp.vec4),
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
@@ -146,7 +148,7 @@ def g2p(
     world = p / capacity
     if p - world * capacity < count[world]:
         take(
-            grid, world, dt[world], moving, phases[world, phase_of[p]], p, held, shifting, pitch, row, exit,
+            grid, world, dt[world], moves, moving, phases[world, phase_of[p]], p, held, shifting, pitch, row, exit,
             position, velocity, affine, volume_ratio, table, block_of, active, fault,
         )  # fmt: skip
 

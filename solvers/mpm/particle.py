@@ -152,6 +152,14 @@ def stressed(
 
 
 @wp.func
+def as_begun(grid: Grid, a: wp.mat33, bent: wp.mat33):
+    """What a stress gives to a node one cell farther along each axis, as cells were where matter has been bent since
+    by 1 + grad u: tau becomes tau (1 + grad u)^-T."""
+    back = wp.inverse(wp.identity(n=3, dtype=float) + bent)
+    return columns_scaled(columns_scaled(a, grid.dx) * wp.transpose(back), grid.inv_dx)
+
+
+@wp.func
 def contained(grid: Grid, x: wp.vec3):
     """A position wrapped along periodic axes and kept in front of walls."""
     out = x

@@ -12,7 +12,7 @@ from fluidbench.native.scene import Phase
 
 from .grid import Grid, activate_stencil, first_node
 from .homes import NOWHERE, PATCH, SIDE, Homes, coordinates, home_of, neighbour, part_of, place_in_patch
-from .particle import affine_of, moved, resistance_of, shifted, stressed, taken, viscous, weights
+from .particle import affine_of, as_begun, moved, resistance_of, shifted, stressed, taken, viscous, weights
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -141,6 +141,7 @@ def scatter(
     volume: wp.array(dtype=float),
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
+    bent: wp.array(dtype=wp.mat33),
     # outputs
     volume_ratio: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
@@ -175,6 +176,8 @@ def scatter(
                 elastic_shear,
                 plastic,
             )
+            if anew == 0.0:
+                a = as_begun(grid, a, bent[p])
             base = first_node(grid, position[p])
             f, wx, wy, wz = weights(grid, position[p], base)
             momentum = m * velocity[p] - a * f
@@ -225,6 +228,7 @@ def gather(
     capacity: int,
     homes: Homes,
     dt: wp.array(dtype=float),
+    moves: float,
     moving: wp.array(dtype=wp.vec4),
     phases: wp.array2d(dtype=Phase),
     phase_of: wp.array(dtype=int),
@@ -243,7 +247,7 @@ def gather(
     active: wp.array(dtype=int),
     fault: wp.array(dtype=int),
 ):
-    """Velocity and affine velocity field of each particle from the patch of its home, then its motion."""
+    """Velocity and affine velocity field of each particle from the patch of its home; then it `moves` (1; else 0)."""
     h, end = part_of(homes, index_of(share, wp.tid()), lanes)
     while h < end:
         start = h * PATCH
@@ -258,7 +262,7 @@ def gather(
             affine[p] = c
             v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
             x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
-            after = moved(grid, x, v, dt[world], p, position, velocity, fault)
+            after = moved(grid, x, v, moves * dt[world], p, position, velocity, fault)
             if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
                 activate_stencil(grid, world, after, table, block_of, active, fault)
                 if home_of(grid, after) != home_of(grid, base):

@@ -9,8 +9,9 @@ A node moves what lies within half a cell of it, so those nearer than that to th
 the bore is not pressed down. In a bore of a body they are held, with its wall.
 
 The piston is firm, its nodes move at its speed and not faster either, where viscosity is solved for (which faster nodes
-would make another equation with every velocity; whatever pushes at them changes nothing), and in the bore of a body:
-there it drives the nodes in the wall, too, and holds what is below it when nothing is extruded.
+would make another equation with every velocity; whatever pushes at them changes nothing), where nodes keep their
+momenta (keeping.py), and in the bore of a body: there it drives the nodes in the wall, too, and holds what is below it
+when nothing is extruded.
 """
 
 from collections.abc import Callable, Sequence

@@ -92,8 +92,11 @@ class SolverMPM(TraitsMPM):
         if meets and told:
             self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes, tool, self.together > 1)
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
-        self.piston = piston_of(scene, self.grid.dx, firm=implicit or self.held is not None)
         self.keeping = Keeping(self) if self.together > 1 else None
+        with wp.ScopedDevice(scene.device):
+            self.bent = wp.zeros(0, dtype=wp.mat33) if self.keeping is None else self.keeping.bent
+        firm = implicit or self.held is not None or self.keeping is not None
+        self.piston = piston_of(scene, self.grid.dx, firm)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
         between = meets or scene.grows or clamps or implicit or self.held is not None  # what a chain leaves out
         self.chain = Chain(self) if not (between or scene.device.is_cpu or backend != "warp") else None
@@ -211,7 +214,7 @@ class SolverMPM(TraitsMPM):
         """The same, of particles themselves; or strain and stress alone, to nodes that have momenta and masses."""
         pool, scene = self.pool, self.scene
         if self.by_block is not None:
-            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, dt, drags, anew, raw)
+            self.by_block.p2g(self.grid, self.table, self.block_of, self.active, dt, drags, anew, self.bent, raw)
             return
         self._launch(
             "p2g",
@@ -231,6 +234,7 @@ class SolverMPM(TraitsMPM):
                 pool.volume,
                 pool.phase,
                 pool.held,
+                self.bent,
                 self.table,
             ],
             [*self.strains, raw, pool.fault],
@@ -267,11 +271,11 @@ class SolverMPM(TraitsMPM):
         )
 
     def g2p(self) -> None:
-        self.take(self.scene.dt, 0, 1)
+        self.take(0, 1, 1.0)
 
-    def take(self, dt: wp.array, number: int, over: int) -> None:
-        """Velocities and their gradients to particles, which move for dt, in the number-th substep of a cycle, from 0
-        on; so many are `over` with it."""
+    def take(self, number: int, over: int, moves: float) -> None:
+        """Velocities and their gradients to particles, which move (1) or stay (0), in the number-th substep of a cycle,
+        from 0 on; so many are `over` with it."""
         if self.held is not None:
             self.empty(self.held.nodes)
             if self.held.dilation is not None:
@@ -279,18 +283,20 @@ class SolverMPM(TraitsMPM):
             self.held.level(self.table, self.piston, self.moving)
         homes = None if self.by_block is None else self.by_block.homes
         if self.gaps is not None:
-            self.gaps.keep(self.table, self.moving, number)
-        self.gather(dt)
+            self.gaps.keep(self.table, self.moving, number, self.bent)
+        self.gather(over, moves)
         if self.gaps is not None:
-            self.gaps.go_on(dt, over, *self.blocks, homes)
+            self.gaps.go_on(moves, over, *self.blocks, homes)
         if self.held is not None:
             self.held.keep_out(self.blocks, homes)
 
-    def gather(self, dt: wp.array) -> None:
+    def gather(self, over: int, moves: float) -> None:
+        """What is carried goes on in every substep, crowds part once in a cycle, for all that are `over`."""
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
+        shifting = self.shifting * over
         if self.by_block is not None:
             pitch = 0.0 if self.held else scene.spacing
-            self.by_block.g2p(self.grid, dt, self.moving, self.shifting, pitch, *self.blocks)
+            self.by_block.g2p(self.grid, moves, self.moving, shifting, pitch, *self.blocks)
             return
         self._launch(
             "g2p",
@@ -299,12 +305,13 @@ class SolverMPM(TraitsMPM):
                 self.grid,
                 pool.capacity,
                 pool.count,
-                dt,
+                scene.dt,
+                moves,
                 self.moving,
                 scene.phases,
                 pool.phase,
                 pool.held,
-                self.shifting,
+                shifting,
                 0.0 if self.held else scene.spacing,
                 hours.row,
                 hours.exit,

@@ -8,7 +8,7 @@ from fluidbench.native.scene import Phase
 from fluidbench.native.vector_access import in_company, load_vec4
 
 from .grid import Grid, activate_stencil, first_node, node_parts, slots_drawn, slots_of
-from .particle import FAULT_STENCIL, affine_of, moved, shifted, stressed, taken, weights
+from .particle import FAULT_STENCIL, affine_of, as_begun, moved, shifted, stressed, taken, weights
 from .together import scatter_together, stencil
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -30,6 +30,7 @@ def give(
     mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     held: wp.array(dtype=int),
+    bent: wp.array(dtype=wp.mat33),
     table: wp.array(dtype=int),
     volume_ratio: wp.array(dtype=float),
     elastic_normal: wp.array(dtype=wp.vec3),
@@ -39,8 +40,8 @@ def give(
     fault: wp.array(dtype=int),
 ):
     """Strain and stress of particle p, then momentum and mass to its 27 nodes (Hu et al. 2018, eqs. 16-18), all of it
-    where these are told `anew` (1), else (0) what its stress changes them by. On a GPU the whole warp must ask; one
-    that is not `active` computes, but writes nothing."""
+    where these are told `anew` (1), else (0) what the stress of matter that was `bent` since changes them by. On a GPU
+    the whole warp must ask; one that is not `active` computes, but writes nothing."""
     m = anew * mass[p]
     x = wp.where(active, position[p], 0.5 * (grid.lower + grid.upper))
     a = stressed(
@@ -60,6 +61,8 @@ def give(
         elastic_shear,
         plastic,
     )
+    if anew == 0.0:
+        a = as_begun(grid, a, bent[p])
     base = first_node(grid, x)
     f, wx, wy, wz = weights(grid, x, base)
     bx, by, bz, lx, ly, lz = node_parts(grid, base)
@@ -135,6 +138,7 @@ def take(
     grid: Grid,
     world: int,
     dt: float,
+    moves: float,
     moving: wp.array(dtype=wp.vec4),
     phase: Phase,
     p: int,
@@ -152,7 +156,8 @@ def take(
     active: wp.array(dtype=int),
     fault: wp.array(dtype=int),
 ):
-    """Velocity and affine velocity field of particle p from its 27 nodes (Jiang et al. 2015), then its motion."""
+    """Velocity and affine velocity field of particle p from its 27 nodes (Jiang et al. 2015), then its motion, if it
+    `moves` (1; else 0)."""
     x = position[p]
     base = first_node(grid, x)
     f, wx, wy, wz = weights(grid, x, base)
@@ -163,6 +168,6 @@ def take(
     affine[p] = c
     v = taken(p, x, sums, c, dt, pitch, row, exit, held, velocity, volume_ratio)
     x += shifted(grid, phase, sums, c, shifting * dt, volume_ratio[p], held[p])
-    after = moved(grid, x, v, dt, p, position, velocity, fault)
+    after = moved(grid, x, v, moves * dt, p, position, velocity, fault)
     if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
         activate_stencil(grid, world, after, table, block_of, active, fault)

@@ -95,3 +95,14 @@ def test_what_counts_is_the_number_of_exchanges_and_not_of_substeps():
     shipped, often, kept_four = width(1, 0.8), width(1, 0.2), width(4, 0.2)
     assert often > shipped + 5e-4
     assert abs(kept_four - shipped) < 0.5 * (often - shipped)
+
+
+def test_what_is_laid_is_no_wider_at_four_times_the_speed_of_sound():
+    """Nor does it swell: to 17.9 instead of 14.8 mm where particles go as they do last and the piston lets go."""
+
+    def width(number, speed):
+        material = PASTE | {"plastic_viscosity": 1.0, "sound_speed": speed}
+        y = final(keeping(number, duration=0.35, spacing=0.0015, material=material))["position"][:, 1]
+        return float(np.quantile(y, 0.98) - np.quantile(y, 0.02))
+
+    assert width(16, 16.0) == pytest.approx(width(4, 4.5), rel=0.05)
