@@ -11,8 +11,8 @@ method has it: nodes go on where they were, and with them the places X of partic
 
 u being the way of a particle since the cycle began, H its gradient. At the end particles take velocities, and go that
 way. For each substep these are the equations of a finite element grid: the bounds on dt are the same, momentum is kept.
-Were H left out, J would not tell that whoever goes straight on in a deforming field is crowded, by tr H^2 / 2 (a bead
-was 5 % too small); were the way that of the last velocity alone, particles would not go where their strain says. The
+Were H left out, J would not tell that whoever goes straight on in a deforming field is crowded, by tr H^2 / 2 (sections
+were 5 % too small); were the way that of the last velocity alone, particles would not go where their strain says. The
 piston is firm (piston.py): one that pushes what is slower and lets go what is faster pumps what swings, which nodes no
 longer damp in every substep.
 """

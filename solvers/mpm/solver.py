@@ -94,7 +94,7 @@ class SolverMPM(TraitsMPM):
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
         self.keeping = Keeping(self) if self.together > 1 else None
         with wp.ScopedDevice(scene.device):
-            self.bent = wp.zeros(0, dtype=wp.mat33) if self.keeping is None else self.keeping.bent
+            self.bent = wp.zeros(1, dtype=wp.mat33) if self.keeping is None else self.keeping.bent
         firm = implicit or self.held is not None or self.keeping is not None
         self.piston = piston_of(scene, self.grid.dx, firm)
         self.unmoved = piston_of(scene, self.grid.dx, still=True)
