@@ -69,7 +69,8 @@ def g2p2g(
             position, velocity, affine, volume_ratio, table, block_of, active, fault,
         )  # fmt: skip
     give(
-        grid, world, dt[world], EXPLICIT, 1.0, phase, p, on, position, velocity, affine, mass, volume, held, affine,
+        grid, world, dt[world], EXPLICIT, 1.0, phase, p, on, position, velocity, affine, mass, volume, held,
+        affine,  # nothing has been bent: it is not read
         table, volume_ratio, elastic_normal, elastic_shear, plastic, raw, fault,
     )  # fmt: skip
 

@@ -52,7 +52,7 @@ class Known:
     number: wp.array(dtype=int)  # of particles beside such blocks,
     members: wp.array(dtype=int)  # these,
     faster: wp.array(dtype=wp.vec3)  # by what each will be faster than what it gathers [m/s],
-    bent: wp.array(dtype=wp.mat33)  # and what its affine velocity field will have more [1/s]
+    steeper: wp.array(dtype=wp.mat33)  # and what its affine velocity field will have more [1/s]
     begun: wp.array(dtype=wp.vec3)  # where nodes keep their momenta (keeping.py): the velocity it began with [m/s],
     pushed: wp.array(dtype=wp.mat33)  # and what it has given since, over mass, to a node one cell farther [m/s]
 

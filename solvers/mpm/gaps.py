@@ -9,7 +9,8 @@ and the push of its own stress, in place of the mean of all,
     v_ip = v_i + g (v_p + (C_p - 4 dt V0 tau / (m_p dx^2)) (x_i - x_p) + dt force - v_i)
 
 The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. (Where
-nodes keep theirs for a cycle of substeps, v_p, C_p are those it began with, and pushes those of all since.) Through
+nodes keep theirs for a cycle of substeps, v_p, C_p are those it began with, and pushes, of tau (1 + H)^-T then, those
+of all since: keeping.py.) Through
 such nodes nothing pushes, drags or strains. (Beside a body pressure of what is elastic is no part of tau, but acts by
 way of nodes that are in no gap: dilation.py.)
 """
@@ -159,7 +160,7 @@ def keep_own(
                     known.begun[member] = begun
                     known.pushed[member] = a
                 known.faster[member] = more
-                known.bent[member] = columns_scaled(turn, 4.0 * grid.inv_dx)
+                known.steeper[member] = columns_scaled(turn, 4.0 * grid.inv_dx)
         t += step
 
 
@@ -192,7 +193,7 @@ def go_on(
         world = p / capacity
         x = position[p]
         velocity[p] = velocity[p] + known.faster[t]
-        affine[p] = affine[p] + known.bent[t]
+        affine[p] = affine[p] + known.steeper[t]
         position[p] = contained(grid, x + (moves * dt[world]) * known.faster[t])
         follow(grid, world, x, position[p], table, block_of, active, homes, fault)
         t += step
@@ -221,7 +222,7 @@ class Gaps:
             known.last, known.row = wp.full(1, -1, dtype=int), wp.full(1, -1, dtype=int)
             known.gap, known.seen = wp.zeros(slots * 64, dtype=float), wp.full(slots, -1, dtype=int)
             known.members, known.faster = wp.zeros(pool.size, dtype=int), wp.zeros(pool.size, dtype=wp.vec3)
-            known.bent = wp.zeros(pool.size, dtype=wp.mat33)
+            known.steeper = wp.zeros(pool.size, dtype=wp.mat33)
             many = pool.size if cycles else 0
             known.begun, known.pushed = wp.zeros(many, dtype=wp.vec3), wp.zeros(many, dtype=wp.mat33)
             self._nobody = wp.zeros(1, dtype=int)

@@ -10,7 +10,9 @@ method has it: nodes go on where they were, and with them the places X of partic
     u += dt v(X),   H += dt grad v(X),   D of strain: of grad v (1 + H)^-1,
 
 u being the way of a particle since the cycle began, H its gradient. At the end particles take velocities, and go that
-way. For each substep these are the equations of a finite element grid: the bounds on dt are the same, momentum is kept.
+way. For each substep these are the equations of a finite element grid: momentum is kept, its moment up to what is not
+linear within a cell, and the bounds on dt are the same as long as H is small, as it is in a tick (at a shear of 0.25 a
+particle alone is 1.17 times as viscous).
 Were H left out, J would not tell that whoever goes straight on in a deforming field is crowded, by tr H^2 / 2 (sections
 were 5 % too small); were the way that of the last velocity alone, particles would not go where their strain says. The
 piston is firm (piston.py): one that pushes what is slower and lets go what is faster pumps what swings, which nodes no
@@ -54,8 +56,8 @@ def keep(
 
 @wp.func
 def turning(grid: Grid, c: wp.mat33, f: wp.mat33, now: wp.mat33):
-    """What the affine field `now` turns too slowly [1/s]: nodes that went along have the moment C D F^T, D = diag(dx^2)
-    / 4, of which the antisymmetric part is spin; where they lie again, they have that of `now` D."""
+    """What the affine field `now` turns too slowly [1/s]: nodes that went along, by a linear field, have the moment
+    C D F^T, D = diag(dx^2) / 4, of which the antisymmetric part is spin; where they lie again, that of `now` D."""
     square = wp.cw_mul(grid.dx, grid.dx)
     lacking = columns_scaled(c, square) * wp.transpose(f) - columns_scaled(now, square)
     return columns_scaled(0.5 * (lacking - wp.transpose(lacking)), wp.cw_mul(grid.inv_dx, grid.inv_dx))
@@ -101,7 +103,8 @@ def go_along(
         bent[p] = h
         if ends == 1:
             x = position[p]
-            moved(grid, x, u, 1.0, p, position, velocity, fault)
+            whole = float(number + 1) * dt[world]
+            moved(grid, x, u / whole, whole, p, position, velocity, fault)
             follow(grid, world, x, position[p], table, block_of, active, homes, fault)
 
 

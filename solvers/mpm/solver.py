@@ -291,7 +291,8 @@ class SolverMPM(TraitsMPM):
             self.held.keep_out(self.blocks, homes)
 
     def gather(self, over: int, moves: float) -> None:
-        """What is carried goes on in every substep, crowds part once in a cycle, for all that are `over`."""
+        """What is carried goes on in every substep; crowds part once in a cycle, for all that are `over`, but not
+        farther than in one."""
         pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
         shifting = self.shifting * over
         if self.by_block is not None:
