@@ -10,9 +10,8 @@ and the push of its own stress, in place of the mean of all,
 
 The particles' w m_p v_ip add up to the node's momentum whatever g is: linear and angular momentum are kept. (Where
 nodes keep theirs for a cycle of substeps, v_p, C_p are those it began with, and pushes, of tau (1 + H)^-T then, those
-of all since: keeping.py.) Through
-such nodes nothing pushes, drags or strains. (Beside a body pressure of what is elastic is no part of tau, but acts by
-way of nodes that are in no gap: dilation.py.)
+of all since: keeping.py.) Through such nodes nothing pushes, drags or strains. (Beside a body pressure of what is
+elastic is no part of tau, but acts by way of nodes that are in no gap: dilation.py.)
 """
 
 import math
