@@ -49,6 +49,25 @@ def store_vec4(target: wp.array(dtype=wp.vec4), index: int, value: wp.vec4):
 @wp.func_native(
     snippet="""
 #if defined(__CUDA_ARCH__)
+#if __CUDA_ARCH__ >= 900
+    asm volatile("red.global.add.v4.f32 [%0], {%1, %2, %3, %4};"
+        :: "l"(&target.data[index]), "f"(value[0]), "f"(value[1]), "f"(value[2]), "f"(value[3]) : "memory");
+#else
+    for (unsigned k = 0; k < 4; ++k) atomicAdd((float*)&target.data[index] + k, value[k]);
+#endif
+#else
+    for (unsigned k = 0; k < 4; ++k) target.data[index][k] += value[k];
+#endif
+"""
+)
+def add_vec4(target: wp.array(dtype=wp.vec4), index: int, value: wp.vec4):
+    """Add to target[index], as other threads of a GPU may at once; on the CPU for a kernel that one thread runs."""
+    ...
+
+
+@wp.func_native(
+    snippet="""
+#if defined(__CUDA_ARCH__)
     return __ldg(&source.data[index]);
 #else
     return source.data[index];

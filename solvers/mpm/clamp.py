@@ -13,8 +13,7 @@ from fluidbench.method.frame import CLAMPED
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Scene
 
-from .grid import Grid, first_node, node_at
-from .homes import on_grid
+from .grid import Grid, first_node, node_at, on_grid
 from .particle import weights
 
 wp.set_module_options({"enable_backward": False})

@@ -29,8 +29,7 @@ from fluidbench.native.crew import index_of
 from fluidbench.native.pool import Pool
 from fluidbench.native.scene import Phase, Scene
 
-from .grid import Grid, first_node, node_at, turns
-from .homes import on_grid
+from .grid import Grid, first_node, node_at, on_grid, turns
 from .particle import mean_stress, presses_nodes, weights
 from .tied import Blocks, node_here
 

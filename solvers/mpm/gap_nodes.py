@@ -18,8 +18,7 @@ from fluidbench.native.crew import index_of
 from fluidbench.native.scene import Phase
 
 from ..tool import Tool, distance_to
-from .grid import Grid, node_of, raw_node, turns
-from .homes import on_grid
+from .grid import Grid, node_of, on_grid, raw_node, turns
 from .particle import ANCHORED
 from .piston import Piston, driven
 from .tied import place_of_node
@@ -67,6 +66,29 @@ def due(known: Known, row: wp.array(dtype=int)):
 def beside(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int), raw: wp.array(dtype=wp.vec4)):
     """Momentum and mass of a node beside one that no wall is next to."""
     return raw_node(grid, world, on_grid(grid, node), table, raw)
+
+
+@wp.func
+def next_to(
+    grid: Grid,
+    world: int,
+    t: int,
+    node: wp.vec3i,
+    axis: int,
+    step: int,
+    table: wp.array(dtype=int),
+    raw: wp.array(dtype=wp.vec4),
+):
+    """The same, a step from node t along an axis: in half of all cases in its block, which need not be looked up."""
+    place = (node[axis] & 3) + step
+    there = node
+    there[axis] = there[axis] + step
+    value = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    if place >= 0 and place < 4:
+        value = raw[t + step * (16 >> (2 * axis))]
+    else:
+        value = beside(grid, world, there, table, raw)
+    return value
 
 
 @wp.func
@@ -122,6 +144,7 @@ def is_wide(
 def gap_at(
     grid: Grid,
     world: int,
+    t: int,
     node: wp.vec3i,
     filled: float,
     full: float,
@@ -129,15 +152,11 @@ def gap_at(
     table: wp.array(dtype=int),
     raw: wp.array(dtype=wp.vec4),
 ):
-    """g of a node, which holds this share of what full ones do; the most along any axis."""
+    """g of node t, which holds this share of what full ones do; the most along any axis."""
     most = float(0.0)
     for axis in range(3):
-        before = node
-        after = node
-        before[axis] = before[axis] - 1
-        after[axis] = after[axis] + 1
-        low = beside(grid, world, before, table, raw)
-        high = beside(grid, world, after, table, raw)
+        low = next_to(grid, world, t, node, axis, -1, table, raw)
+        high = next_to(grid, world, t, node, axis, 1, table, raw)
         mean = mean_beside(low[3], high[3], full)
         if mean > 0.0:
             lack = 1.0 - filled / mean
@@ -189,7 +208,7 @@ def find_gaps(
         if mass > 0.0 and mass < (1.0 - known.common) * full:
             node = corner + wp.vec3i((t & 63) >> 4, (t >> 2) & 3, t & 3)
             if not near_any(grid, node):
-                found = gap_at(grid, world, node, mass / full, full, known, table, raw)
+                found = gap_at(grid, world, t, node, mass / full, full, known, table, raw)
             if found > 0.0:
                 place = place_of_node(grid, node)
                 if known.tied > 0.0:

@@ -106,6 +106,15 @@ def wrapped(node: int, first: int, wrap: int):
 
 
 @wp.func
+def on_grid(grid: Grid, base: wp.vec3i):
+    """A node whose index may lie beyond the end of a periodic axis."""
+    node = base
+    for axis in range(3):
+        node[axis] = wrapped(base[axis], grid.first[axis], grid.wrap[axis])
+    return node
+
+
+@wp.func
 def first_node(grid: Grid, x: wp.vec3):
     """The lowest of the 27 nodes around a point (before wrapping)."""
     y = wp.cw_mul(x - grid.origin, grid.inv_dx)
@@ -187,21 +196,26 @@ def raw_node(grid: Grid, world: int, node: wp.vec3i, table: wp.array(dtype=int),
 
 
 @wp.func
-def node_parts(grid: Grid, base: wp.vec3i):
-    """Per axis the block and in-block contributions to the address of the three stencil nodes."""
+def parts_of(grid: Grid, low: wp.vec3i, middle: wp.vec3i, high: wp.vec3i):
+    """Per axis the block and in-block contributions to the address of three nodes."""
     bx, by, bz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
     lx, ly, lz = wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0), wp.vec3i(0, 0, 0)
+    nodes = wp.matrix_from_rows(low, middle, high)
     for o in range(3):
-        i = wrapped(base[0] + o, grid.first[0], grid.wrap[0])
-        j = wrapped(base[1] + o, grid.first[1], grid.wrap[1])
-        k = wrapped(base[2] + o, grid.first[2], grid.wrap[2])
-        bx[o] = (i >> 2) * grid.blocks[1] * grid.blocks[2]
-        by[o] = (j >> 2) * grid.blocks[2]
-        bz[o] = k >> 2
-        lx[o] = (i & 3) << 4
-        ly[o] = (j & 3) << 2
-        lz[o] = k & 3
+        bx[o] = (nodes[o, 0] >> 2) * grid.blocks[1] * grid.blocks[2]
+        by[o] = (nodes[o, 1] >> 2) * grid.blocks[2]
+        bz[o] = nodes[o, 2] >> 2
+        lx[o] = (nodes[o, 0] & 3) << 4
+        ly[o] = (nodes[o, 1] & 3) << 2
+        lz[o] = nodes[o, 2] & 3
     return bx, by, bz, lx, ly, lz
+
+
+@wp.func
+def node_parts(grid: Grid, base: wp.vec3i):
+    """The same of the nodes of a stencil."""
+    one = wp.vec3i(1, 1, 1)
+    return parts_of(grid, on_grid(grid, base), on_grid(grid, base + one), on_grid(grid, base + 2 * one))
 
 
 @wp.func
@@ -217,6 +231,14 @@ def slots_of(table: wp.array(dtype=int), start: int, bx: wp.vec3i, by: wp.vec3i,
         table[start + bx[2] + by[2] + bz[0]] - 1,
         table[start + bx[2] + by[2] + bz[2]] - 1,
     )
+
+
+@wp.func
+def slot_of(low: bool, near: bool, first: bool, s0: int, s1: int, s2: int, s3: int, s4: int, s5: int, s6: int, s7: int):
+    """Of eight blocks the one that is the lower or not along x, y and z."""
+    t0, t1 = wp.where(low, s0, s4), wp.where(low, s1, s5)
+    t2, t3 = wp.where(low, s2, s6), wp.where(low, s3, s7)
+    return wp.where(first, wp.where(near, t0, t2), wp.where(near, t1, t3))
 
 
 @wp.func_native(

@@ -8,7 +8,7 @@ import warp as wp
 
 from fluidbench.native.crew import index_of, raise_fault
 
-from .grid import Grid, first_node, wrapped
+from .grid import Grid, first_node, on_grid
 from .particle import FAULT_STENCIL
 
 wp.set_module_options({"enable_backward": False})
@@ -31,15 +31,6 @@ class Homes:
     of_particle: wp.array(dtype=int)  # the slot of its home; NOWHERE for none
     outdated: wp.array(dtype=int)
     patch: wp.array(dtype=wp.vec4)
-
-
-@wp.func
-def on_grid(grid: Grid, base: wp.vec3i):
-    """A node whose index may lie beyond the end of a periodic axis."""
-    node = base
-    for axis in range(3):
-        node[axis] = wrapped(base[axis], grid.first[axis], grid.wrap[axis])
-    return node
 
 
 @wp.func

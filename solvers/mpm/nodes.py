@@ -3,8 +3,9 @@ passes that are rare or small. (Momentum goes faster: patches.py, together.py.)"
 
 import warp as wp
 
-from .grid import Grid, activate_stencil, first_node, node_at
-from .homes import on_grid
+from fluidbench.native.vector_access import add_vec4, load_vec4
+
+from .grid import Grid, activate_stencil, first_node, on_grid, parts_of, slot_of, slots_of
 from .particle import ANCHORED, PACKED, weights
 from .walls import in_front
 
@@ -12,13 +13,29 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 
 @wp.func
-def signs_of(node: wp.vec3i, inside: wp.vec3i):
-    """Of a vector's components as seen in walls by a node that is the image of the node inside."""
-    signs = wp.vec3(1.0, 1.0, 1.0)
-    for axis in range(3):
-        if inside[axis] != node[axis]:
-            signs[axis] = -1.0
-    return signs
+def front(grid: Grid, base: wp.vec3i, o: int):
+    """Along each axis the o-th node of a stencil, or the one in front of a wall whose image it is."""
+    return on_grid(grid, in_front(grid, base + wp.vec3i(o, o, o)))
+
+
+@wp.func
+def parts_in_front(grid: Grid, base: wp.vec3i):
+    """node_parts, of the nodes in front of walls for their images."""
+    return parts_of(grid, front(grid, base, 0), front(grid, base, 1), front(grid, base, 2))
+
+
+@wp.func
+def signs_in_front(grid: Grid, base: wp.vec3i, vector: bool):
+    """Of a vector's component along x, y and z as seen in walls by the three nodes along that axis: -1 by images."""
+    sx, sy, sz = wp.vec3(1.0, 1.0, 1.0), wp.vec3(1.0, 1.0, 1.0), wp.vec3(1.0, 1.0, 1.0)
+    if vector:
+        for o in range(3):
+            node = base + wp.vec3i(o, o, o)
+            inside = in_front(grid, node)
+            sx[o] = wp.where(inside[0] == node[0], 1.0, -1.0)
+            sy[o] = wp.where(inside[1] == node[1], 1.0, -1.0)
+            sz[o] = wp.where(inside[2] == node[2], 1.0, -1.0)
+    return sx, sy, sz
 
 
 @wp.func
@@ -35,18 +52,17 @@ def tell_nodes(
     vector's component across is turned round."""
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
+    bx, by, bz, lx, ly, lz = parts_in_front(grid, base)
+    s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
+    sx, sy, sz = signs_in_front(grid, base, vector)
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                node = base + wp.vec3i(o, q, r)
-                inside = in_front(grid, node)
-                at = node_at(grid, world, on_grid(grid, inside), table)
-                if at >= 0:
-                    told = row
-                    if vector:
-                        signs = signs_of(node, inside)
-                        told = wp.vec4(signs[0] * row[0], signs[1] * row[1], signs[2] * row[2], row[3])
-                    wp.atomic_add(nodes, at, (wx[o] * wy[q] * wz[r]) * told)
+                slot = slot_of(bx[o] == bx[0], by[q] == by[0], bz[r] == bz[0], s0, s1, s2, s3, s4, s5, s6, s7)
+                if slot >= 0:
+                    w = wx[o] * wy[q] * wz[r]
+                    told = wp.vec4(w * sx[o] * row[0], w * sy[q] * row[1], w * sz[r] * row[2], w * row[3])
+                    add_vec4(nodes, slot * 64 + lx[o] + ly[q] + lz[r], told)
 
 
 @wp.func
@@ -56,19 +72,18 @@ def mean_of_nodes(
     """The mean at x of what nodes were told in three components; the fourth is its weight."""
     base = first_node(grid, x)
     _f, wx, wy, wz = weights(grid, x, base)
+    bx, by, bz, lx, ly, lz = parts_in_front(grid, base)
+    s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
+    sx, sy, sz = signs_in_front(grid, base, vector)
     mean = wp.vec3(0.0, 0.0, 0.0)
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                node = base + wp.vec3i(o, q, r)
-                inside = in_front(grid, node)
-                at = node_at(grid, world, on_grid(grid, inside), table)
-                if at >= 0 and nodes[at][3] > 0.0:
-                    share = wx[o] * wy[q] * wz[r] / nodes[at][3]
-                    heard = wp.vec3(nodes[at][0], nodes[at][1], nodes[at][2])
-                    if vector:
-                        heard = wp.cw_mul(signs_of(node, inside), heard)
-                    mean += share * heard
+                slot = slot_of(bx[o] == bx[0], by[q] == by[0], bz[r] == bz[0], s0, s1, s2, s3, s4, s5, s6, s7)
+                heard = load_vec4(nodes, wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r])
+                if slot >= 0 and heard[3] > 0.0:
+                    share = wx[o] * wy[q] * wz[r] / heard[3]
+                    mean += share * wp.vec3(sx[o] * heard[0], sy[q] * heard[1], sz[r] * heard[2])
     return mean
 
 
@@ -82,17 +97,18 @@ def room_of(
     holds is full."""
     base = first_node(grid, x)
     f, wx, wy, wz = weights(grid, x, base)
+    bx, by, bz, lx, ly, lz = parts_in_front(grid, base)
+    s0, s1, s2, s3, s4, s5, s6, s7 = slots_of(table, world * grid.blocks_per_world, bx, by, bz)
     room = float(0.0)
     least = PACKED
     slope = wp.vec3(0.0, 0.0, 0.0)
     for o in range(3):
         for q in range(3):
             for r in range(3):
-                inside = in_front(grid, base + wp.vec3i(o, q, r))
-                at = node_at(grid, world, on_grid(grid, inside), table)
-                full = float(0.0)
-                if at >= 0:
-                    full = moving[at][3] / density
+                slot = slot_of(bx[o] == bx[0], by[q] == by[0], bz[r] == bz[0], s0, s1, s2, s3, s4, s5, s6, s7)
+                full = load_vec4(moving, wp.max(slot, 0) * 64 + lx[o] + ly[q] + lz[r])[3] / density
+                if slot < 0:
+                    full = 0.0
                 if full > ANCHORED:
                     full = 1.0
                 least = wp.min(least, full)
