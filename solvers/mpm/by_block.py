@@ -104,12 +104,11 @@ class ByBlock:
         moves: float,
         moving: wp.array,
         shifting: float,
-        pitch: float,
         table: wp.array,
         block_of: wp.array,
         active: wp.array,
     ) -> None:
-        pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
+        pool, scene = self.pool, self.scene
         self.launch(
             gather,
             self.lanes,
@@ -125,9 +124,6 @@ class ByBlock:
                 pool.phase,
                 pool.held,
                 shifting,
-                pitch,
-                hours.row,
-                hours.exit,
             ],
             [
                 pool.position,

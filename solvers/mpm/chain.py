@@ -38,8 +38,6 @@ def g2p2g(
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
     shifting: float,
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
     mass: wp.array(dtype=float),
     volume: wp.array(dtype=float),
     # outputs
@@ -65,7 +63,7 @@ def g2p2g(
     phase = phases[world, phase_of[p]]
     if on:
         take(
-            grid, world, dt[world], 1.0, moving, phase, p, held, shifting, 0.0, row, exit,
+            grid, world, dt[world], 1.0, moving, phase, p, held, shifting,
             position, velocity, affine, volume_ratio, table, block_of, active, fault,
         )  # fmt: skip
     give(
@@ -105,7 +103,6 @@ class Chain:
 
     def _take_and_give(self, nodes: wp.array) -> None:
         solver, scene, pool = self.solver, self.solver.scene, self.solver.pool
-        hours = scene.clock.hours
         solver.backend.launch(
             g2p2g,
             pool.size,
@@ -119,8 +116,6 @@ class Chain:
                 pool.phase,
                 pool.held,
                 solver.shifting,
-                hours.row,
-                hours.exit,
                 pool.mass,
                 pool.volume,
             ],

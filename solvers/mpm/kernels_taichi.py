@@ -51,7 +51,7 @@ from .grid_taichi import (
     touched,
     wrapped,
 )
-from .particle import ANCHORED, FAULT_STENCIL, PACKED, STEEPEST
+from .particle import ANCHORED, FAULT_STENCIL, STEEPEST
 from .piston import BELOW, FINE, WIDE, Piston
 
 spline = taichi_func(quadratic_spline)
@@ -125,9 +125,6 @@ def g2p(
     phase_of: Ints,
     held: Ints,
     shifting: float,
-    pitch: float,
-    row: Ints,
-    exit: Vectors,
     position: Vectors,
     velocity: Vectors,
     affine: Matrices,
@@ -155,10 +152,6 @@ def g2p(
                 if not is_solid(phase) and crowding > 1.0 and crowding < ANCHORED:
                     amount = ti.min(shifting * h * shear_rate(moment), STEEPEST)
                     x -= (4.0 * amount / phase.density) * lean * grid.dx
-            elif held[p] == CARRIED and v[2] < 0.0:
-                ahead = gathered[2] + moment[2, 2] * (exit[row[0]][2] + 0.5 * pitch - x[2]) - v[2]
-                left = ti.math.clamp(1.0 + ahead / v[2], 1.0 / PACKED, PACKED)
-                volume_ratio[p] += ti.min(-v[2] * h / pitch, 1.0) * (left - volume_ratio[p])
             free = x + moves * h * v
             if too_fast(v, grid.top_speed):
                 ti.atomic_or(fault[0], FAULT_ASTRAY)

@@ -130,9 +130,6 @@ def g2p(
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
     shifting: float,
-    pitch: float,
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
     # outputs
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -148,7 +145,7 @@ def g2p(
     world = p / capacity
     if p - world * capacity < count[world]:
         take(
-            grid, world, dt[world], moves, moving, phases[world, phase_of[p]], p, held, shifting, pitch, row, exit,
+            grid, world, dt[world], moves, moving, phases[world, phase_of[p]], p, held, shifting,
             position, velocity, affine, volume_ratio, table, block_of, active, fault,
         )  # fmt: skip
 

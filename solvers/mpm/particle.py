@@ -177,37 +177,13 @@ def contained(grid: Grid, x: wp.vec3):
 
 
 @wp.func
-def taken(
-    p: int,
-    x: wp.vec3,
-    sums: wp.mat44,
-    gradient: wp.mat33,
-    dt: float,
-    pitch: float,
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
-    held: wp.array(dtype=int),
-    velocity: wp.array(dtype=wp.vec3),
-    volume_ratio: wp.array(dtype=float),
-):
-    """Particle p, at x, takes the velocity that it gathered (the sums' first row), if it is free; returns that which it
-    moves with.
-
-    What is carried moves on at its own speed U whatever the grid does, what is free moves with the grid: where they
-    meet matter is crowded by U over the grid's speed there, which no velocity gradient shows. Flux is the same on both
-    sides, so that is the volume ratio with which matter is let go, as a mean over one spacing.
-    """
+def taken(p: int, sums: wp.mat44, held: wp.array(dtype=int), velocity: wp.array(dtype=wp.vec3)):
+    """Particle p takes the velocity that it gathered (the sums' first row), if it is free; returns that which it moves
+    with."""
     v = velocity[p]
-    gathered = wp.vec3(sums[0, 0], sums[0, 1], sums[0, 2])
     if held[p] == FREE:
-        v = gathered
+        v = wp.vec3(sums[0, 0], sums[0, 1], sums[0, 2])
         velocity[p] = v
-    elif held[p] == CARRIED and v[2] < 0.0 and pitch > 0.0:
-        # the grid's speed beyond its own, half a spacing above the outlet: from there on its own gradient tells
-        ahead = gathered[2] + gradient[2, 2] * (exit[row[0]][2] + 0.5 * pitch - x[2]) - v[2]
-        j = volume_ratio[p]
-        left = wp.clamp(1.0 + ahead / v[2], 1.0 / PACKED, PACKED)
-        volume_ratio[p] = j + wp.min(-v[2] * dt / pitch, 1.0) * (left - j)
     return v
 
 

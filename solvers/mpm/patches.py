@@ -234,9 +234,6 @@ def gather(
     phase_of: wp.array(dtype=int),
     held: wp.array(dtype=int),
     shifting: float,
-    pitch: float,
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
     # outputs
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
@@ -260,7 +257,7 @@ def gather(
             sums = taken_from_nodes(homes.patch, start + place_in_patch(grid, base), wx, wy, wz, f)
             c = affine_of(grid, sums)
             affine[p] = c
-            v = taken(p, x, sums, c, dt[world], pitch, row, exit, held, velocity, volume_ratio)
+            v = taken(p, sums, held, velocity)
             x += shifted(grid, phases[world, phase_of[p]], sums, c, shifting * dt[world], volume_ratio[p], held[p])
             after = moved(grid, x, v, moves * dt[world], p, position, velocity, fault)
             if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:

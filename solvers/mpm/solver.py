@@ -28,6 +28,7 @@ from .implicit import GridViscosity
 from .keeping import Keeping
 from .particle import EXPLICIT, IMPLICIT, PRESSED
 from .piston import piston_of
+from .release import Release
 from .separation import EVERY, Separation
 from .settling import TURNS, Settling
 from .tool import Held
@@ -92,6 +93,8 @@ class SolverMPM(TraitsMPM):
         if meets and told:
             self.gaps = Gaps(scene, pool, self.grid, slots, self.node_lanes, tool, self.together > 1)
         self.arranges, self.turns = EVERY if apart or settles else 0, TURNS
+        fed = scene.scenario.emits and self.held is None
+        self.release = Release(scene, pool, self.grid) if fed else None
         self.keeping = Keeping(self) if self.together > 1 else None
         with wp.ScopedDevice(scene.device):
             self.bent = wp.zeros(1, dtype=wp.mat33) if self.keeping is None else self.keeping.bent
@@ -285,19 +288,19 @@ class SolverMPM(TraitsMPM):
         if self.gaps is not None:
             self.gaps.keep(self.table, self.moving, number, self.bent)
         self.gather(over, moves)
+        if self.release is not None:
+            self.release.go_on(self.table, self.moving)
         if self.gaps is not None:
             self.gaps.go_on(moves, over, *self.blocks, homes)
         if self.held is not None:
             self.held.keep_out(self.blocks, homes)
 
     def gather(self, over: int, moves: float) -> None:
-        """What is carried goes on in every substep; crowds part once in a cycle, for all that are `over`, but not
-        farther than in one."""
-        pool, scene, hours = self.pool, self.scene, self.scene.clock.hours
+        """Crowds part once in a cycle, for all substeps that are `over`, but not farther than in one."""
+        pool, scene = self.pool, self.scene
         shifting = self.shifting * over
         if self.by_block is not None:
-            pitch = 0.0 if self.held else scene.spacing
-            self.by_block.g2p(self.grid, moves, self.moving, shifting, pitch, *self.blocks)
+            self.by_block.g2p(self.grid, moves, self.moving, shifting, *self.blocks)
             return
         self._launch(
             "g2p",
@@ -313,9 +316,6 @@ class SolverMPM(TraitsMPM):
                 pool.phase,
                 pool.held,
                 shifting,
-                0.0 if self.held else scene.spacing,
-                hours.row,
-                hours.exit,
             ],
             [
                 pool.position,
@@ -333,7 +333,7 @@ class SolverMPM(TraitsMPM):
         if self.scene.changes:
             self.scene.crew.load(aging)
         self.order.prepare()
-        for part in (self.clamps, self.separation, self.settling, self.gaps, self.keeping, self.chain):
+        for part in (self.clamps, self.separation, self.settling, self.gaps, self.release, self.keeping, self.chain):
             if part is not None:
                 part.prepare()
         self.backend.prepare(self)

@@ -144,9 +144,6 @@ def take(
     p: int,
     held: wp.array(dtype=int),
     shifting: float,
-    pitch: float,
-    row: wp.array(dtype=int),
-    exit: wp.array(dtype=wp.vec3),
     position: wp.array(dtype=wp.vec3),
     velocity: wp.array(dtype=wp.vec3),
     affine: wp.array(dtype=wp.mat33),
@@ -166,7 +163,7 @@ def take(
     sums = sums_of(moving, f, wx, wy, wz, bx, by, bz, lx, ly, lz, s0, s1, s2, s3, s4, s5, s6, s7)
     c = affine_of(grid, sums)
     affine[p] = c
-    v = taken(p, x, sums, c, dt, pitch, row, exit, held, velocity, volume_ratio)
+    v = taken(p, sums, held, velocity)
     x += shifted(grid, phase, sums, c, shifting * dt, volume_ratio[p], held[p])
     after = moved(grid, x, v, moves * dt, p, position, velocity, fault)
     if after[0] != base[0] or after[1] != base[1] or after[2] != base[2]:
