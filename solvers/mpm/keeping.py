@@ -128,6 +128,9 @@ class Keeping:
 
     def _cycle(self, substeps: int) -> None:
         solver, scene = self.solver, self.solver.scene
+        if substeps == 1:  # keeps nothing
+            solver.substep()
+            return
         for number in range(substeps):
             if scene.grows:
                 solver.swell()
