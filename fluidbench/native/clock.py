@@ -65,6 +65,12 @@ class Clock:
             return 0.0, 0.0
         return 0.5 * self.stream.nozzle.diameter, self.stream.nozzle.rise
 
+    @property
+    def mean_speed(self) -> float:
+        """Of the stream, while it extrudes [m/s]."""
+        assert self.stream is not None
+        return self.stream.nozzle.speed
+
     def speed_at(self, radius: np.ndarray) -> np.ndarray:
         """Of the stream at radii [m] from its axis, while it extrudes [m/s]."""
         assert self.stream is not None

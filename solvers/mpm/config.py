@@ -26,7 +26,7 @@ class ConfigMPM(Config):
     )
     viscous_tolerance: Tolerance = 1e-4
     kept: Annotated[int, Field(ge=1, le=64)] = Field(
-        4,
+        8,
         description="substeps, where matter is fed freely, for which nodes keep their momenta before particles take "
         "them back",
     )

@@ -6,6 +6,10 @@ outlet has J = u / U, each particle by the grid there where it passes: at a rim,
 the bore, a tenth less than at its middle, or a quarter. Matter is let go in discs a spacing apart, and u beats with
 them: how far one is from the next the mean of u tells since the one before was let go, so J is that, over the last
 spacing of its way.
+
+A disc is let go as a whole, half of it before it has passed, and a stiff mortar that was told at once burst: by c times
+the crowding, a hundred times as fast as it was fed, into gaps that its strength held open. What is let go owes that
+ratio therefore, and comes to it while the other half passes, a spacing / (4 U) on average.
 """
 
 import warp as wp
@@ -21,6 +25,9 @@ from .grid import Grid, first_node, node_parts, slot_of, slots_of
 from .particle import PACKED, weights
 
 wp.set_module_options({"enable_backward": False})
+
+PAID = wp.constant(1.0e-4)  # of ln J
+LAG = 0.25  # of the time in which a spacing passes: from when a disc is let go to when its rest passes, on average
 
 
 @wp.func
@@ -48,6 +55,7 @@ def crowd(
     count: wp.array(dtype=int),
     dt: wp.array(dtype=float),
     spacing: float,
+    rate: float,
     hours: Hours,
     held: wp.array(dtype=int),
     position: wp.array(dtype=wp.vec3),
@@ -55,23 +63,32 @@ def crowd(
     table: wp.array(dtype=int),
     moving: wp.array(dtype=wp.vec4),
     # outputs
+    owed: wp.array(dtype=float),
     volume_ratio: wp.array(dtype=float),
 ):
-    """J of what is carried within a spacing [m] of the outlet: the mean of u / U there, since it was as far from it."""
+    """ln J that is owed by what is carried within a spacing [m] of the outlet: of the mean of u / U there, since it was
+    as far from it. What is free comes to it at a `rate` [1/s]."""
     p = index_of(share, wp.tid())
     world = p / capacity
-    if p - world * capacity < count[world] and held[p] == CARRIED:
-        row = hours.row[0]
-        outlet = position[p]
-        outlet[2] = hours.exit[row][2]
-        above = position[p][2] - outlet[2]
-        drift = hours.drift[wp.max(row - 1, 0)][2]
-        fed = drift - velocity[p][2]
-        if fed > 0.0 and above < spacing:
-            passing = (drift - rising(grid, world, outlet, table, moving)) / fed
-            share_of_way = fed * dt[world] / wp.max(spacing - above, fed * dt[world])
-            j = volume_ratio[p]
-            volume_ratio[p] = j + share_of_way * (wp.clamp(passing, 1.0 / PACKED, PACKED) - j)
+    if p - world * capacity < count[world]:
+        if held[p] == CARRIED:
+            row = hours.row[0]
+            outlet = position[p]
+            outlet[2] = hours.exit[row][2]
+            above = position[p][2] - outlet[2]
+            drift = hours.drift[wp.max(row - 1, 0)][2]
+            fed = drift - velocity[p][2]
+            if fed > 0.0 and above < spacing:
+                passing = (drift - rising(grid, world, outlet, table, moving)) / fed
+                part = fed * dt[world] / wp.max(spacing - above, fed * dt[world])
+                mean = wp.exp(owed[p]) * (1.0 - part) + part * wp.clamp(passing, 1.0 / PACKED, PACKED)
+                owed[p] = wp.log(mean)
+        elif owed[p] != 0.0:
+            left = owed[p] * wp.exp(-rate * dt[world])
+            if wp.abs(left) < PAID:
+                left = 0.0
+            volume_ratio[p] = volume_ratio[p] * wp.exp(owed[p] - left)
+            owed[p] = left
 
 
 class Release:
@@ -79,6 +96,8 @@ class Release:
 
     def __init__(self, scene: Scene, pool: Pool, grid: Grid) -> None:
         self.scene, self.pool, self.grid = scene, pool, grid
+        pool.add_field("owed", float)
+        self.rate = scene.clock.mean_speed / (LAG * scene.spacing)
 
     def prepare(self) -> None:
         self.scene.crew.load(__name__)
@@ -86,6 +105,6 @@ class Release:
     def go_on(self, table: wp.array, moving: wp.array) -> None:
         """Enqueue, once nodes have their velocities, in every substep."""
         scene, pool = self.scene, self.pool
-        some = [self.grid, pool.capacity, pool.count, scene.dt, scene.spacing, scene.clock.hours]
+        some = [self.grid, pool.capacity, pool.count, scene.dt, scene.spacing, self.rate, scene.clock.hours]
         matter = [pool.held, pool.position, pool.velocity]
-        scene.crew.launch(crowd, pool.size, [*some, *matter, table, moving], [pool.volume_ratio])
+        scene.crew.launch(crowd, pool.size, [*some, *matter, table, moving], [pool.owed, pool.volume_ratio])

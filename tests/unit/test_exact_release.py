@@ -12,19 +12,20 @@ from solvers.mpm.release import crowd
 
 from ..conftest import scenario
 
-DX, D, U, OUTLET = 0.02, 0.01, 0.1, 0.098
+DX, D, U, OUTLET, RATE = 0.02, 0.01, 0.1, 0.098, 40.0
 
 
 def let_go(speeds, dt, start=1.2 * D, slope=2.0, drift=0.0, held=CARRIED):
-    """J of a particle that is carried down at U from `start` above the outlet [m], while nodes there go down at each of
-    these speeds [m/s] for dt [s], and slower by `slope` [1/s] with height; outlet and all go at `drift` [m/s]."""
+    """J that is owed by a particle that is carried down at U from `start` above the outlet [m], while nodes there go
+    down at each of these speeds [m/s] for dt [s], and slower by `slope` [1/s] with height; outlet and all go at `drift`
+    [m/s]."""
     grid = grid_of(Scene(scenario(domain={"lower": [0, 0, 0], "upper": [0.2, 0.2, 0.2]}, spacing=D)), DX)
     nodes = np.arange(grid.blocks_per_world * 64)
     block = nodes // 64
     height = (block % grid.blocks[2]) * 4 + (nodes & 3)
     ints = {"dtype": int, "device": "cpu"}
     table = wp.array(np.arange(grid.blocks_per_world) + 1, **ints)
-    ratio = wp.array([1.0], dtype=float, device="cpu")
+    owed, ratio = (wp.array([v], dtype=float, device="cpu") for v in (0.0, 1.0))
     hours = Hours()
     hours.row = wp.array([1], **ints)
     hours.drift = wp.array([[0.0, 0.0, drift], [9.0] * 3], dtype=wp.vec3, device="cpu")
@@ -36,10 +37,11 @@ def let_go(speeds, dt, start=1.2 * D, slope=2.0, drift=0.0, held=CARRIED):
         place = [[0.1, 0.1, outlet + start - U * dt * (step + 1)]]  # where it has come to in this step
         hours.exit = wp.array([[9.0] * 3, [0.0, 0.0, outlet]], dtype=wp.vec3, device="cpu")
         matter = [wp.array([int(held)], **ints), wp.array(place, dtype=wp.vec3, device="cpu"), velocity]
-        some = [wp.vec3i(0, 1, 0), grid, 1, wp.array([1], **ints), wp.array([dt], dtype=float, device="cpu"), D, hours]
-        given = [*some, *matter, table, wp.array(moving, dtype=wp.vec4, device="cpu"), ratio]
+        some = [wp.vec3i(0, 1, 0), grid, 1, wp.array([1], **ints), wp.array([dt], dtype=float, device="cpu"), D, RATE]
+        given = [*some, hours, *matter, table, wp.array(moving, dtype=wp.vec4, device="cpu"), owed, ratio]
         wp.launch(crowd, dim=1, inputs=given, device="cpu")
-    return float(ratio.numpy()[0])
+    assert ratio.numpy()[0] == 1.0  # what is owed by what is carried presses nothing
+    return float(np.exp(owed.numpy()[0]))
 
 
 @pytest.mark.parametrize("drift", [0.0, -0.3, 0.2])
@@ -63,3 +65,23 @@ def test_only_what_is_carried_and_nearly_out_is_crowded():
     assert let_go([0.05] * 10, 0.01, held=CLAMPED) == 1.0
     assert let_go([0.05] * 10, 0.01, start=2.1 * D) == 1.0  # a spacing or more above it all the time
     assert let_go([0.05], 0.0) == 1.0  # no time, no way
+
+
+def test_what_is_owed_is_paid_in_the_time_in_which_the_rest_of_a_disc_passes():
+    """J comes to exactly that, however long steps are, by an e-th of what is left in a quarter of d / U."""
+    ints = {"dtype": int, "device": "cpu"}
+    nothing = [wp.zeros(1, dtype=kind, device="cpu") for kind in (wp.vec3, wp.vec3, int, wp.vec4)]
+    for owing, dt in ((-0.2, 1e-3), (0.1, 7e-3)):
+        count, steps, free = wp.array([1], **ints), wp.array([dt], dtype=float, device="cpu"), wp.array([FREE], **ints)
+        owed = wp.array([owing], dtype=float, device="cpu")
+        ratio = wp.array([0.9], dtype=float, device="cpu")
+        grid = grid_of(Scene(scenario(domain={"lower": [0, 0, 0], "upper": [0.2, 0.2, 0.2]}, spacing=D)), DX)
+        given = [wp.vec3i(0, 1, 0), grid, 1, count, steps, D, RATE, Hours(), free, *nothing, owed, ratio]
+        seen = []
+        for _ in range(round(0.5 / dt)):
+            wp.launch(crowd, dim=1, inputs=given, device="cpu")
+            seen.append(float(ratio.numpy()[0]))
+        after = round(1.0 / (RATE * dt))
+        left = np.log(0.9 * np.exp(owing) / seen[after - 1]) / owing
+        assert left == pytest.approx(np.exp(-RATE * dt * after), rel=0.01)
+        assert seen[-1] == pytest.approx(0.9 * np.exp(owing), rel=1e-5) and owed.numpy()[0] == 0.0
