@@ -122,9 +122,10 @@ class Keeping:
         self.solver.scene.crew.load(__name__)
 
     def go(self, substeps: int) -> None:
-        """Enqueue so many substeps, in cycles."""
-        for first in range(0, substeps, self.solver.together):
-            self._cycle(min(self.solver.together, substeps - first))
+        """Enqueue so many substeps, in cycles: two at least, for with one a tick what was laid crept on."""
+        longest = min(self.solver.together, max(substeps - 1, 1))
+        for first in range(0, substeps, longest):
+            self._cycle(min(longest, substeps - first))
 
     def _cycle(self, substeps: int) -> None:
         solver, scene = self.solver, self.solver.scene
