@@ -207,7 +207,7 @@ class Simulation(Readout):
 
     def _whole_tick(self, audited: bool, feeding: bool, stale: bool, turn: int, substeps: int) -> None:
         self._start_tick(audited, feeding, stale, turn)
-        self._substeps(substeps)
+        self._substeps(substeps, self.solver.portion(substeps))
 
     def _age(self, feeding: bool) -> None:
         """What happens to material whatever the method, at the start of a tick."""
@@ -298,12 +298,12 @@ class Simulation(Readout):
     def kick(self, velocity: np.ndarray) -> None:
         self.pool.velocity.assign(velocity.astype(np.float32))
 
-    def _substeps(self, number: int) -> None:
-        """Everything of so many substeps, as it is captured."""
+    def _substeps(self, number: int, portion: int) -> None:
+        """Everything of so many substeps, in portions, as it is captured."""
         after = [part.substep for part in (self.scene.carriage, self.contact) if part is not None]
         with CountedLaunches() as counted:
             if not after:
-                self.solver.substeps(number)
+                self.solver.substeps(number, portion)
             else:
                 for _ in range(number):
                     for part in (self.solver.substep, *after):
@@ -319,20 +319,21 @@ class Simulation(Readout):
             self._launch(substeps)
 
     def _recorded(self, substeps: int) -> list[tuple[list[Any], int]]:
-        """The graphs of so many substeps, and how often each: one for all on CUDA; on the CPU, where replay is free, as
-        few substeps in one as the solver takes together."""
-        each = self.solver.together if self.scene.device.is_cpu else substeps
+        """The graphs of so many substeps, and how often each: one for all on CUDA; on the CPU, where replay is free, of
+        a portion and of the rest."""
+        portion = self.solver.portion(substeps)
+        each = portion if self.scene.device.is_cpu else substeps
         portions = [(each, substeps // each), (substeps % each, 1)]
         found = []
         for size, times in portions:
             if size * times > 0:
-                found.append((self.scene.crew.recorded(size, partial(self._substeps, size)), times))
+                found.append((self.scene.crew.recorded(size, partial(self._substeps, size, portion)), times))
         return found
 
     def _launch(self, substeps: int) -> None:
         """Launch `substeps` substeps one by one, between those of Warp that came before and come after."""
         self._wait()
-        self._substeps(substeps)
+        self._substeps(substeps, self.solver.portion(substeps))
         self._wait()
 
     def _wait(self) -> None:

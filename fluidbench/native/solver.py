@@ -25,7 +25,6 @@ class Solver(Method):
     faults: ClassVar[dict[int, str]] = {}
     arranges: int = 0  # ticks from one call of `arrange` to the next; 0 for never
     turns: int = 1  # calls of `arrange` until it does the same again
-    together: int = 1  # substeps that are best enqueued as one
     sort_bits: int = 64  # of its sort keys, from the lowest on, that tell any two apart
     makes_room: bool = False  # whether it must be told when particles were put where others may be
     backend: Any = None  # what runs the passes: `name`, and `wait()` for all that was launched
@@ -60,8 +59,13 @@ class Solver(Method):
         `scene.crew.launch` alone; any other may use `wp.launch`.
         """
 
-    def substeps(self, number: int) -> None:
-        """Enqueue so many of them, with nothing in between; a method may have a shorter way than one by one."""
+    def portion(self, substeps: int) -> int:
+        """How many substeps of a tick of so many belong together: it is enqueued in such portions, and a rest."""
+        return 1
+
+    def substeps(self, number: int, portion: int) -> None:
+        """Enqueue so many of them in portions, with nothing in between; a method may have a shorter way than one by
+        one."""
         for _ in range(number):
             self.substep()
 

@@ -121,9 +121,8 @@ class Keeping:
     def prepare(self) -> None:
         self.solver.scene.crew.load(__name__)
 
-    def go(self, substeps: int) -> None:
-        """Enqueue so many substeps, in cycles: two at least, for with one a tick what was laid crept on."""
-        longest = min(self.solver.together, max(substeps - 1, 1))
+    def go(self, substeps: int, longest: int) -> None:
+        """Enqueue so many substeps, in cycles of so many and a rest."""
         for first in range(0, substeps, longest):
             self._cycle(min(longest, substeps - first))
 

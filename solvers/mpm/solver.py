@@ -159,12 +159,17 @@ class SolverMPM(TraitsMPM):
         for name in self.passes:
             getattr(self, name)()
 
-    def substeps(self, number: int) -> None:
-        way = self.chain or self.keeping
-        if way is None:
-            super().substeps(number)
+    def portion(self, substeps: int) -> int:
+        """A cycle of keeping.py: two a tick at least, for with one what was laid crept on."""
+        return min(self.together, max(substeps - 1, 1))
+
+    def substeps(self, number: int, portion: int) -> None:
+        if self.keeping is not None:
+            self.keeping.go(number, portion)
+        elif self.chain is not None:
+            self.chain.go(number)
         else:
-            way.go(number)
+            super().substeps(number, portion)
 
     def swell(self) -> None:
         pool = self.pool
