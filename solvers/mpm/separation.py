@@ -3,10 +3,11 @@
 Where matter is sheared, particles that a grid carries along come as near to each other as they like: no stress resists
 what has no velocity gradient. They line up in threads with gaps between, and what is measured finer than a cell finds
 less matter than there is. So every few ticks, where matter flows, pairs nearer than a spacing leave each other as in
-SPH (../crowding.py), in proportion to the strain meanwhile. What the grid does see of these shifts, their mean over its
-nodes, is taken off again, and once more of what is left: it would widen whatever is strained (a flattened drop by 6 %
-of its radius), for no volume ratio knows of it. Velocities stay: the momentum of nodes is changed by no more than how
-the field bends within a cell.
+SPH (../crowding.py), in proportion to the strain meanwhile; those that touch, nearer than a quarter of one, at once,
+wherever matter deforms: what hardly flows brings single pairs so near, and leaves them there. What the grid does see of
+these shifts, their mean over its nodes, is taken off again, and once more of what is left: it would widen whatever is
+strained (a flattened drop by 6 % of its radius), for no volume ratio knows of it. Velocities stay: the momentum of
+nodes is changed by no more than how the field bends within a cell.
 
 What has grown is evened out as well, as in SPH (../corrected.py): the halves of split particles lie as they were
 born, and where none is within a cell the grid finds a gap in what should be full.
@@ -27,7 +28,7 @@ from ..backends import Warp
 from ..bind import warp_func
 from ..cells import Cells, WhoIsWhere, bucket_of, cell_of, place
 from ..corrected import enclosed, least_eigenvalue
-from ..crowding import excess, farthest, nearest, out_of_crowd
+from ..crowding import excess, farthest, nearest
 from ..flow import flows, shear_rate
 from ..images import face_kind, has_choice, image_position, near_faces, undoing
 from ..pairs import floats
@@ -42,11 +43,13 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 EVERY = 4  # ticks: in each matter goes a quarter of a spacing at most
 KERNEL = 1.5  # smoothing length of the crowding, in spacings: SPH's in matter that lies in no order
 CLOSE = 1.0  # distance below which particles are moved apart, in spacings: nothing in a lattice is
+TOUCHING = 0.25  # distance below which they are parted at once, in spacings: two halves of what is shifted
+STIRRED = 1.0e-4  # strain meanwhile from which matter deforms, a thousandth of what brings two together
 TEAM = 8  # threads that look around a particle on a GPU: alone each waits for 27 cells, one after the other
 LONGEST = wp.constant(0.25)  # shift at a time, in spacings: as far as matter goes in a tick
 
 slope = warp_func(wendland_slope)
-Sums = floats(12)  # crowding (3), the gradient of the concentration (3) and the second moment: xx yy zz xy xz yz
+Sums = floats(12)  # shift / h^2 (3), the gradient of the concentration (3) and the second moment: xx yy zz xy xz yz
 
 
 @wp.struct
@@ -57,6 +60,8 @@ class Apart:
     near: float  # kernel at the distance below which partners crowd each other [1/m^3]
     strain: float  # shift over the rate of shear and h^2 crowding [s],
     farthest: float  # and over h^2 crowding at most [-]
+    touching: float  # distance below which it is as far as that [m]
+    stirred: float  # rate of shear from which matter deforms [1/s]
     evens: int  # 1 where matter grows, and is evened out
 
 
@@ -69,13 +74,14 @@ def through(
     i: int,
     x: wp.vec3,
     code: int,
+    strain: float,
     volume: wp.array(dtype=float),
     member: int,
     team: int,
     sums: Sums,
 ):
     """The sums of particle i at x, gone on with over the images of all of this code, its own as well, or the others
-    themselves (0), in the cells of one member of a team."""
+    themselves (0), in the cells of one member of a team; its shift is `strain` times h^2 crowding."""
     signs = wp.vec3(1.0, 1.0, 1.0)
     for axis in range(3):
         if face_kind(box, code, axis) != PERIODIC:
@@ -90,7 +96,8 @@ def through(
             length = wp.length(r)
             if length < cells.width and length > 0.0 and (code > 0 or cells.members[m] != i):
                 w = slope(length / num.h, num.h) * volume[cells.members[m]]
-                crowds = excess(length, num.h, num.near) * w
+                by = wp.where(length < num.touching, num.farthest, strain)
+                crowds = by * excess(length, num.h, num.near) * w
                 for a in range(3):
                     sums[a] += crowds * r[a]
                 if num.evens == 1:
@@ -126,18 +133,20 @@ def separate(
     # outputs
     shift: wp.array(dtype=wp.vec4),
 ):
-    """How far each particle is to be shifted [m], and 1 if it takes part: if it is a liquid's, or would flow in a step
-    as it is."""
+    """How far each particle is to be shifted [m], and 1 if it takes part: if it touches another, is a liquid's, or
+    would flow in a step as it is."""
     thread = index_of(share, wp.tid())
     i = thread / team
     world = i / capacity
     active = i - world * capacity < count[world]
-    flowing = bool(False)
+    strain, grown = float(0.0), bool(False)
     sums = Sums()
     if active and held[i] == FREE:
-        phase = phases[world, phase_of[i]]
-        flowing = flows(phase, affine[i], elastic_normal[i], elastic_shear[i], dt[world], i, plastic)
-        if flowing:
+        phase, rate = phases[world, phase_of[i]], shear_rate(affine[i])
+        if flows(phase, affine[i], elastic_normal[i], elastic_shear[i], dt[world], i, plastic):
+            strain = wp.min(num.strain * rate, num.farthest)
+            grown = num.evens == 1 and rest_density(mass, volume, i) < GROWN * phase.density
+        if rate > num.stirred:
             x = position[i]
             near = near_faces(box, x, cells.width, True)
             walled = near_faces(box, x, cells.width, False)
@@ -148,22 +157,18 @@ def separate(
                 codes = 27
             for code in range(codes):
                 if has_choice(near, code):
-                    sums = through(num, box, cells, world, i, x, code, volume, thread - i * team, team, sums)
+                    sums = through(num, box, cells, world, i, x, code, strain, volume, thread - i * team, team, sums)
     for k in range(12):
         sums[k] = joined(sums[k], team)
     if active and thread == i * team:
-        found = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        if flowing:
-            phase = phases[world, phase_of[i]]
-            crowd = wp.vec3(sums[0], sums[1], sums[2])
-            if num.evens == 1 and rest_density(mass, volume, i) < GROWN * phase.density:
-                moment = wp.mat33(
-                    sums[6], sums[9], sums[10], sums[9], sums[7], sums[11], sums[10], sums[11], sums[8]
-                )  # fmt: skip
-                crowd += enclosed(least_eigenvalue(moment)) * wp.vec3(sums[3], sums[4], sums[5])
-            by = out_of_crowd(crowd, num.h, num.strain * shear_rate(affine[i]), num.farthest)
-            found = wp.vec4(by[0], by[1], by[2], 1.0)
-        shift[i] = found
+        by = wp.vec3(sums[0], sums[1], sums[2])
+        if grown:
+            moment = wp.mat33(
+                sums[6], sums[9], sums[10], sums[9], sums[7], sums[11], sums[10], sums[11], sums[8]
+            )  # fmt: skip
+            by += strain * enclosed(least_eigenvalue(moment)) * wp.vec3(sums[3], sums[4], sums[5])
+        by *= -num.h * num.h
+        shift[i] = wp.vec4(by[0], by[1], by[2], wp.where(strain > 0.0 or wp.length_sq(by) > 0.0, 1.0, 0.0))
 
 
 @wp.kernel
@@ -245,7 +250,9 @@ class Separation:
         num.h = KERNEL * scene.spacing
         r0 = CLOSE * scene.spacing
         num.near, num.farthest = nearest(r0, num.h), farthest(scene.spacing, r0, num.h)
+        num.touching = TOUCHING * scene.spacing
         num.strain = constant * EVERY * scene.clock.tick
+        num.stirred = STIRRED / (EVERY * scene.clock.tick)
         num.evens = int(scene.expands)
         with wp.ScopedDevice(scene.device):
             self.shift = wp.zeros(pool.size, dtype=wp.vec4)

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from fluidbench.method.frame import CARRIED, CLAMPED
 from fluidbench.native.simulation import Simulation
 from solvers.crowding import crowding
-from solvers.mpm.separation import CLOSE, EVERY, KERNEL
+from solvers.mpm.separation import CLOSE, EVERY, KERNEL, STIRRED, TOUCHING
 
 from ..conftest import scenario
 
@@ -48,12 +48,12 @@ def moves(sim, times=1):
     return sim.pool.snapshot()["position"].astype(float) - before
 
 
-def paired(x):
-    """The lattice with its two middle particles of a row moved together to 0.3 spacings."""
+def paired(x, apart=0.3):
+    """The lattice with its two middle particles of a row moved together to so many spacings."""
     out = x.copy()
     row = np.flatnonzero((np.abs(x[:, 1] - D / 2) < 1e-6) & (np.abs(x[:, 2] - D / 2) < 1e-6) & (np.abs(x[:, 0]) < D))
     assert len(row) == 2
-    out[row, 0] *= 0.3
+    out[row, 0] *= apart
     return out
 
 
@@ -131,6 +131,26 @@ def test_what_does_not_flow_stays(strength, moved):
     """An elastic solid, and a paste of which the stress that it carries is far from its yield stress, or beyond it."""
     sim = cube(paired, 30.0 * SHEAR, {"density": 1000.0, "youngs_modulus": 1e4, **strength})
     assert moves(sim).any() == moved
+
+
+@pytest.mark.parametrize("apart", [0.05, 0.15, 0.24])
+def test_those_that_touch_are_parted_once_wherever_matter_deforms(apart):
+    """Two in an elastic solid that hardly shears; a lattice about them does not move by more than the mean that is
+    taken off, nor they once they are parted. At rest they stay."""
+    elastic = {"density": 1000.0, "youngs_modulus": 1e4}
+
+    def touching(rate):
+        return cube(lambda x: paired(x, apart), rate * SHEAR, elastic)
+
+    assert not moves(touching(0.0)).any()
+    sim = touching(2.0 * STIRRED / (EVERY * cube().tick))
+    close = middle(sim)
+    by = moves(sim, 3)
+    x = sim.pool.snapshot()["position"].astype(float)
+    assert TOUCHING * D < abs(x[close[0], 0] - x[close[1], 0]) < D
+    assert by[close].sum(axis=0) == pytest.approx(0.0, abs=1e-3 * D)
+    assert not np.delete(by, close, axis=0).any()
+    assert not moves(sim, 3).any()
 
 
 def test_a_liquid_flows():
