@@ -91,6 +91,25 @@ def image_velocity(box: Box, v: wp.vec3, code: int):
 
 
 @wp.func
+def turned_back(box: Box, code: int):
+    """Per axis, 2 where the derivative along it is of an image's velocity turned round once more, else 0: along no-slip
+    walls, across which alone velocities are turned.
+
+    Stress is seen in such walls as it is, for flow goes on along them, so derivatives along them must be of velocities
+    as they are: stress does exactly the work of the strain then (see `corrected.py`). With derivatives of velocities
+    turned round along walls, too, what lies near them hardly stretched, and what rested on a floor fed on the
+    difference.
+    """
+    turns, back = float(1.0), wp.vec3(0.0, 0.0, 0.0)
+    for axis in range(3):
+        if face_kind(box, code, axis) == STICK:
+            turns = -turns
+    for axis in range(3):
+        back[axis] = 1.0 - wp.where(face_kind(box, code, axis) == STICK, -turns, turns)
+    return back
+
+
+@wp.func
 def image_gradient(box: Box, g: wp.vec3, code: int):
     """The gradient of a scalar seen in the walls: mirrors turn its normal component round."""
     out = g

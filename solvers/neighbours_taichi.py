@@ -64,6 +64,18 @@ def image_velocity(box, v, code):
 
 
 @ti.func
+def turned_back(box, code):
+    """Per axis, 2 where the derivative along it is of an image's velocity turned round once more, else 0."""
+    turns, back = 1.0, vec3(0.0)
+    for axis in ti.static(range(3)):
+        if face_kind(box, code, axis) == STICK:
+            turns = -turns
+    for axis in ti.static(range(3)):
+        back[axis] = 1.0 + turns if face_kind(box, code, axis) == STICK else 1.0 - turns
+    return back
+
+
+@ti.func
 def image_gradient(box, g, code):
     """The gradient of a scalar seen in the walls."""
     out = g

@@ -53,7 +53,7 @@ def no_faces(box: Box, code: int):
 
 
 @wp.func
-def as_summed(faces: wp.vec3, sums: Any):
+def as_summed(num: Any, faces: wp.vec3, own: Any, other: Any, r: wp.vec3, sums: Any):
     return sums
 
 
@@ -66,7 +66,7 @@ class Pass:
     - seen(box, data, row, j, code) -> row: an image's, whose position is in place already
     - pair(num, own, other, r) -> sums: r points from the neighbour; own has the row, then what `begin` gave
     - faces(box, code) -> vec3: what `across` asks of the walls that an image lies behind, found once an image
-    - across(faces, sums) -> sums: what an image adds, of what it would as a particle
+    - across(num, faces, own, other, r, sums) -> sums: what an image adds, of what it would as a particle
     - finish(num, box, data, world, i, own, sums)
     """
 
@@ -171,7 +171,7 @@ def _side_by_side(p: Pass) -> Callable:
                     for c in range(4):
                         own[4 * q + c] = owns[4 * q + c, lane]
                 r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
-                add = across(behind, pair(num, own, other, r))
+                add = across(num, behind, own, other, r, pair(num, own, other, r))
                 for q in range(wp.static(F // 4)):
                     for c in range(4):
                         totals[4 * q + c, lane] += add[4 * q + c]
@@ -217,7 +217,7 @@ def _in_teams(p: Pass) -> Callable:
             other[c] = x[c]
         other = seen(box, data, other, entry & INDEX_MASK, code)
         r = wp.vec3(own[0] - other[0], own[1] - other[1], own[2] - other[2])
-        return across(faces(box, code), pair(num, own, other, r))
+        return across(num, faces(box, code), own, other, r, pair(num, own, other, r))
 
     def sweep(
         num: p.num,

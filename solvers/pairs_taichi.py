@@ -13,7 +13,7 @@ def as_seen(box, extra: ti.template(), row, j, code):
 
 
 @ti.func
-def as_summed(box, code, sums):
+def as_summed(num, box, code, own, other, r, sums):
     return sums
 
 
@@ -89,7 +89,7 @@ def over_pairs(
 ) -> Callable:
     """The function that sums pair(num, own, begun, other, r) over the neighbours of a particle: `own` and `other` are
     rows of `length` floats, `begun` is what the particle brings beside, r points from the neighbour. An image's row is
-    seen(box, extra, row, j, code), and what it adds across(box, code, sums)."""
+    seen(box, extra, row, j, code), and what it adds across(num, box, code, own, other, r, sums)."""
     read = reader(length)
 
     @ti.func
@@ -115,9 +115,10 @@ def over_pairs(
                     other = seen(
                         box, extra, vector_into(other, 0, image_position(box, vector_at(other, 0), code)), j, code
                     )
-                add = pair(num, own, begun, other, vector_at(own, 0) - vector_at(other, 0))
+                r = vector_at(own, 0) - vector_at(other, 0)
+                add = pair(num, own, begun, other, r)
                 if code > 0:
-                    add = across(box, code, add)
+                    add = across(num, box, code, own, other, r, add)
                 total += add
         return total
 

@@ -77,7 +77,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
         return vector_into(ti.Vector.zero(ti.f32, 6), 0, f * (push + along * r))
 
     @ti.func
-    def rough_apart(box, code, sums):
+    def rough_apart(num, box, code, own, other, r, sums):
         """What friction walls push along their normals stands by itself."""
         out = sums
         for axis in ti.static(range(3)):

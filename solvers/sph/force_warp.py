@@ -120,7 +120,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
         return sums
 
     @wp.func
-    def across(rough: wp.vec3, sums: Sums):
+    def across(num: Smoothing, rough: wp.vec3, own: Own, other: Other, r: wp.vec3, sums: Sums):
         for a in range(3):
             sums[3 + a] = rough[a] * sums[a]
             sums[a] = sums[a] - sums[3 + a]

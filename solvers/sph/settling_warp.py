@@ -75,7 +75,7 @@ def tell_pass(tensile: bool, tooled: bool) -> Pass:
         return sums
 
     @wp.func
-    def across(walls: wp.vec3, sums: Sums):
+    def across(num: Smoothing, walls: wp.vec3, own: Own, other: Other, r: wp.vec3, sums: Sums):
         if wp.static(not tensile):
             crowds = 1.0 - wp.max(walls)
             for a in range(3):

@@ -17,7 +17,7 @@ from ..corrected_taichi import (
 )
 from ..flow_taichi import pressure, shear_rate, strained
 from ..hourglass_taichi import off_linear_after
-from ..neighbours_taichi import BoxT, ListsT, image_gradient, image_velocity
+from ..neighbours_taichi import BoxT, ListsT, image_gradient, image_velocity, turned_back
 from ..pairs_taichi import (
     matrix_into,
     over_pairs,
@@ -85,7 +85,18 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
             sums[1], sums[2] = w * u.dot(r), -w * r.norm_sqr()
         return sums
 
-    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen)
+    @ti.func
+    def strain_across(num, box, code, own, other, r, sums):
+        out = sums
+        if ti.static(tensile):
+            w = other[3] * slope(r.norm() / num.h, num.h)
+            if ti.static(changing):
+                w *= own[11] / other[11]
+            turned = vector_at(other, 4).outer_product(turned_back(box, code) * r)
+            out = matrix_into(out, 1, stressed(out, 1) - w * turned)
+        return out
+
+    strained_by = over_pairs(MATTER, many, strain_pair, matter_seen, strain_across)
 
     @ti.kernel
     def strain(

@@ -24,7 +24,7 @@ from ..corrected import (
 from ..crowding import excess, out_of_crowd
 from ..flow import pressure, shear_rate, strained
 from ..hourglass import off_linear
-from ..images import image_gradient, image_velocity
+from ..images import image_gradient, image_velocity, turned_back
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
 from .force_warp import width_of
@@ -126,6 +126,18 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             for a in range(3):
                 sums[22 + a] = w * u[a]
                 sums[25 + a] = m[a]
+        return sums
+
+    @wp.func
+    def across(num: Smoothing, back: wp.vec3, own: Own, other: Other, r: wp.vec3, sums: Sums):
+        if wp.static(tensile):
+            w = other[3] * slope(wp.length(r) / num.h, num.h)
+            if wp.static(changing):
+                w *= own[11] / other[11]
+            for b in range(3):
+                m = w * back[b] * r[b]
+                for a in range(3):
+                    sums[1 + 3 * a + b] -= m * other[4 + a]
         return sums
 
     @wp.func
@@ -265,4 +277,4 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         if wp.static(changing):
             store_vec4(data.state, at + state_of - 1, wp.vec4(rho, rest, phase.viscosity, sound))
 
-    return Pass(Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter)
+    return Pass(Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter, faces=turned_back, across=across)

@@ -20,6 +20,7 @@ from solvers.images import (
     image_velocity,
     near_faces,
     opposite,
+    turned_back,
 )
 from solvers.pbd import walls
 
@@ -61,6 +62,7 @@ def look(
     vectors[i, 1] = image_velocity(b, v, c)
     vectors[i, 2] = image_gradient(b, v, c)
     vectors[i, 3] = image_traction(b, v, c)
+    vectors[i, 4] = turned_back(b, c)
     matrices[i, 0] = mirrored_stress(b, g, c)
     for axis in range(3):
         numbers[i, axis] = image_code(c, axis)
@@ -75,7 +77,7 @@ X, GRADIENT = np.array([0.25, 0.5, 3.0]), np.arange(1.0, 10.0).reshape(3, 3)
 def seen(b, *codes, near=(7, 7, 7)):
     """(vectors, matrices, numbers) of each code, see `look`."""
     n = len(codes)
-    out = [wp.zeros((n, 4), dtype=wp.vec3), wp.zeros((n, 1), dtype=wp.mat33), wp.zeros((n, 8), dtype=int)]
+    out = [wp.zeros((n, 5), dtype=wp.vec3), wp.zeros((n, 1), dtype=wp.mat33), wp.zeros((n, 8), dtype=int)]
     wp.launch(
         look,
         n,
@@ -89,11 +91,11 @@ def seen(b, *codes, near=(7, 7, 7)):
 @pytest.mark.parametrize("kind", [SLIP, STICK, FRICTION, PERIODIC])
 def test_images_in_each_face(axis, kind):
     """A stress changes sign with what slips, a pull against crooked motion with its normal component, but at no-slip
-    walls."""
+    walls. Along these velocities are turned back."""
     b = box(*[kind if a == axis else SLIP for a in range(3)])
     for choice, mirror, shift in ((1, 2 * LOW - X, LOW - HIGH), (2, 2 * HIGH - X, HIGH - LOW)):
         choices = [choice if a == axis else 0 for a in range(3)]
-        (x, v, g, pull), (stress,), numbers = (rows[0] for rows in seen(b, code_of(*choices)))
+        (x, v, g, pull, back), (stress,), numbers = (rows[0] for rows in seen(b, code_of(*choices)))
         expected = X.copy()
         expected[axis] = X[axis] + shift[axis] if kind == PERIODIC else mirror[axis]
         assert x == pytest.approx(expected)
@@ -105,17 +107,19 @@ def test_images_in_each_face(axis, kind):
         normal = np.ones(3) if kind == PERIODIC else one
         assert v.tolist() == (turned * V).tolist() and g.tolist() == (normal * V).tolist()
         assert pull.tolist() == ((one if kind in (SLIP, FRICTION) else np.ones(3)) * V).tolist()
+        assert back.tolist() == ((one + 1.0) if kind == STICK else np.zeros(3)).tolist()
         signs = one if kind in (SLIP, FRICTION) else np.ones(3)
         assert stress == pytest.approx(np.outer(signs, signs) * GRADIENT)
 
 
 def test_images_in_corners_combine():
-    (x, v, g, pull), (stress,), numbers = (rows[0] for rows in seen(box(SLIP, STICK, PERIODIC), code_of(1, 2, 1)))
+    (x, v, g, pull, back), (stress,), numbers = (rows[0] for rows in seen(box(SLIP, STICK, PERIODIC), code_of(1, 2, 1)))
     assert (
         x == pytest.approx([-0.25, 3.5, -2.0]) and v.tolist() == [1.0, -2.0, -4.0] and g.tolist() == [-1.0, -2.0, 4.0]
     )
     assert list(numbers) == [1, 2, 1, SLIP, STICK, PERIODIC, code_of(2, 1, 2), 1]
-    assert pull.tolist() == (np.array([-1, 1, 1]) * V).tolist()
+    assert pull.tolist() == (np.array([-1, 1, 1]) * V).tolist() and back.tolist() == [2.0, 0.0, 2.0]
+    assert seen(box(STICK, STICK, SLIP), code_of(1, 1, 0))[0][0, 4].tolist() == [2.0, 2.0, 0.0]
     assert stress == pytest.approx(np.outer([-1, 1, 1], [-1, 1, 1]) * GRADIENT)
 
 
