@@ -90,9 +90,9 @@ CASE = Case(
     scenarios=scenarios,
     evaluate=evaluate,
     causes={
-        "sph": "5 to 11 % too wide: a dome with a wide foot where printed strands bulge. Neither gravity, stiffness, "
-        "yield stress, consistency nor the tip's size changes the shape, and PBD's is wide, too: it may be the law's, "
-        "or the walls'",
+        "sph": "up to 10 % too wide, at D / 8 and D / 12: a dome with a wide foot where printed strands bulge. Neither "
+        "gravity, stiffness, yield stress, consistency nor the tip's size changes the shape, and PBD's is wide, too: "
+        "it may be the law's, or the walls'",
         "pbd": "11 to 16 % too wide at D / 12, a dome as SPH's",
     },
 )
