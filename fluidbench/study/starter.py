@@ -1,4 +1,5 @@
-"""A first scenario of one's own, from five answers: a commented file with the material of a shipped one."""
+"""A first scenario of one's own, from five answers: a commented file with the material of a shipped one, and with its
+numerics, without which the same print comes out otherwise."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from .workplace import methods_of
 PATIENCE = 600.0  # seconds of a run, as estimated, from which its limit of 900 may be short
 
 MATERIALS = {"paste": "line_bead", "concrete": "concrete_wall", "melt": "melt_line", "foam": "foam_wall"}
-"""What is printed, and the shipped scenario whose material it is."""
+"""What is printed, and the shipped scenario whose material and numerics it takes."""
 ACROSS = {"preview": 6, "balance": 8, "accuracy": 12}
 """What matters, and the particles across the nozzle that it takes."""
 BESIDE, ABOVE, REST = 3.0, 2.5, 0.1  # nozzle diameters of room; share of the path's time that a run goes on after it
@@ -112,7 +113,9 @@ def scenario_text(answers: dict[str, str], name: str) -> str:
     return _template().render(
         name=name,
         material=material,
-        block=material_of(material),
+        block=tables_of(MATERIALS[material], "material"),
+        shipped=MATERIALS[material],
+        numerics=tables_of(MATERIALS[material], "numerics"),
         bore=bore,
         gap=gap,
         rise=gap,
@@ -165,12 +168,11 @@ def _upwards(value: float) -> float:
     return float(f"{math.ceil(value / step - 1e-9) * step:.6g}")
 
 
-def material_of(name: str) -> str:
-    """The tables of a shipped scenario's material, with their comments."""
-    text = find(MATERIALS[name]).read_text(encoding="utf-8")
-    found = re.search(r"^\[material\].*?(?=^\[(?!material))", text, re.DOTALL | re.MULTILINE)
-    assert found is not None
-    return found[0].rstrip() + "\n"
+def tables_of(name: str, table: str) -> str:
+    """A table of a shipped scenario with the tables in it, as TOML with its comments; nothing where it has none."""
+    text = find(name).read_text(encoding="utf-8")
+    found = re.findall(rf"^\[{table}(?:\.[^\]]*)?\].*?(?=^\[|\Z)", text, re.DOTALL | re.MULTILINE)
+    return "".join(found).rstrip() + "\n" if found else ""
 
 
 def _latest(material: Material) -> float:
