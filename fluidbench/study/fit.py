@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,8 @@ from .lengths import lengths_of
 
 ORDERS = (0, 1, 2)  # in the spacing, that a length may have
 NOISE = 0.01  # share of a length that its scatter may have without casting doubt on a fit
+SURE = 0.9  # probability with which a slope must be told from none
+FINEST = 3  # spacings by which it is judged whether a length has settled
 
 
 @dataclass(frozen=True)
@@ -26,10 +29,40 @@ class Fit:
 
     @property
     def explains(self) -> bool:
-        """Whether the fit says more of the length than chance: its distances from it are small beside what it rises
-        over the spacings, or beside the length itself."""
-        rise = abs(self.slope) * (max(self.residual) ** self.order - min(self.residual) ** self.order)
-        return max(self.residual.values()) <= max(0.5 * rise, NOISE * abs(self.limit))
+        """Whether the length goes with the spacing by more than chance, or has settled."""
+        return self.rises or self.settled
+
+    @property
+    def rises(self) -> bool:
+        """Whether its slope is told from none at SURE, two-sided, by the scatter about the fit: of three spacings one
+        is left to tell the scatter by, so that they must lie on the fit all but exactly. No slope is none."""
+        return self.order > 0 and abs(self.slope) > self.doubt
+
+    @property
+    def doubt(self) -> float:
+        """Half the width of the slope's interval at SURE: Student's t times its standard error, by least squares of
+        weights 1 / d. In the slope's unit."""
+        from scipy.special import stdtrit
+
+        d, free = np.array(list(self.residual)), len(self.residual) - 2
+        if free < 1:
+            return math.inf
+        x, w = d**self.order, d**-2.0
+        spread = float(w @ (x - np.average(x, weights=w)) ** 2)
+        scatter = float(w @ np.array(list(self.residual.values())) ** 2) / free
+        return float(stdtrit(free, 0.5 + 0.5 * SURE)) * math.sqrt(scatter / spread)
+
+    @property
+    def settled(self) -> bool:
+        """Whether it has no more `unrest` than a length can be told to."""
+        return self.unrest <= NOISE
+
+    @property
+    def unrest(self) -> float:
+        """The largest distance from the fit at the FINEST spacings, over the limit. What it was off by when it was
+        coarser does not count: it is not expected to have been as near."""
+        furthest = max(self.residual[d] for d in sorted(self.residual)[:FINEST])
+        return furthest / abs(self.limit) if self.limit else math.inf
 
     def scatter(self, spacing: float) -> float:
         """The largest distance from the fit at this spacing and finer ones."""

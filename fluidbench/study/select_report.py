@@ -91,8 +91,10 @@ def _command(name: str, best: Candidate) -> str:
 
 def _further(chosen: Selection, best: Candidate) -> str:
     """What half the error would take, where the errors tried say so."""
-    if not chosen.converges(best.method):
-        return f"the error of {best.method} does not fall with the spacing, so a finer one promises nothing"
+    if best.method in chosen.erratic:
+        return f"a length of {best.method} scatters (see below): what a finer spacing gains is not known"
+    if why := chosen.slack(best.method):
+        return f"the error of {best.method} {why}; a finer one promises little"
     order = chosen.order(best.method)
     if not order > FALLS:  # too small to fall
         return f"the error of {best.method} is nothing but what cannot be measured"

@@ -30,6 +30,7 @@ from ..scenario import Scenario
 from ..scenario.measured import Measured
 from .fit import NOISE, Fit, extrapolate
 from .lengths import lengths_of
+from .remarks import scattered, unconverged
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
 FINEST = 0.5  # and on a GPU
@@ -81,7 +82,7 @@ class Selection:
     notes: list[str] = field(default_factory=list)
     untried: list[str] = field(default_factory=list)  # what there was no time for
     scenario: Scenario | None = None
-    erratic: set[str] = field(default_factory=set)  # methods with a length that no line through its spacings explains
+    erratic: dict[str, str] = field(default_factory=dict)  # methods with a length that no fit explains: which, and why
 
     @property
     def remarks(self) -> list[str]:
@@ -103,16 +104,26 @@ class Selection:
             return math.nan
         return float(np.polyfit(np.log([c.spacing for c in own]), np.log([c.discretisation for c in own]), 1)[0])
 
-    def converges(self, method: str) -> bool:
-        """Whether a method's error falls as it is refined, in all, and at the finest spacing once more; or was never
-        more than noise."""
+    def slack(self, method: str) -> str:
+        """What a method's error does where it does not fall as it is refined: in all, and at the finest spacing once
+        more, where it is more than noise; nothing where it falls, or was never more than noise."""
         own = sorted((c for c in self.candidates if c.method == method), key=lambda c: c.spacing)
         if len(own) < ENOUGH:
-            return False
-        if all(c.discretisation <= NOISE for c in own):
-            return method not in self.erratic
-        falling = own[0].discretisation <= own[1].discretisation * (1.0 + 1e-9)
-        return falling and method not in self.erratic and (own[0].discretisation == 0 or self.order(method) > FALLS)
+            return f"is known at fewer than {ENOUGH} spacings"
+        finest = own[0].discretisation
+        if finest == 0 or all(c.discretisation <= NOISE for c in own):
+            return ""
+        if not (order := self.order(method)) > 0:
+            return "does not fall with the spacing"
+        if order <= FALLS:
+            return f"hardly falls with the spacing: by an order of {order:.3g}, and {FALLS:g} is wanted"
+        if finest > max(NOISE, own[1].discretisation * (1.0 + 1e-9)):
+            return "does not fall any more at the finest spacing"
+        return ""
+
+    def converges(self, method: str) -> bool:
+        """Whether every length of a method goes with the spacing or has settled, and its error falls."""
+        return method not in self.erratic and not self.slack(method)
 
     def front(self) -> list[Candidate]:
         """The candidates that none beats in both cost and error, cheapest first."""
@@ -189,8 +200,9 @@ def assess(
             result.notes.append(f"{method}: left out, for want of it at some spacing: {', '.join(left)}")
         fits[method] = {key: extrapolate(own, key) for key in shared}
         result.limits[method] = {key: fit.limit for key, fit in fits[method].items()}
-        if not all(fit.explains for key, fit in fits[method].items() if key not in exact_lengths(own[0]) | told):
-            result.erratic.add(method)
+        estimated = {key: fit for key, fit in fits[method].items() if key not in exact_lengths(own[0]) | told}
+        if why := scattered(estimated, own):
+            result.erratic[method] = why
     for run in runs:
         result.notes += [f"{run.name}: left out: {line}" for line in departures(run.record.measures) if run.ok]
         if restless := [key for key in run.record.moving if key in lengths_of(run.record)]:
@@ -218,7 +230,7 @@ def assess(
             made = _candidate(run, fits[run.method], consensus, told)
             result.candidates += [made] if made else []
             result.notes += [] if made else [f"{run.name}: has no length to be judged by"]
-    result.notes += [_unconverged(result, method) for method in fits if not result.converges(method)]
+    result.notes += [unconverged(result, method) for method in fits if not result.converges(method)]
     return result
 
 
@@ -229,16 +241,6 @@ def averages(measured: Sequence[Measured]) -> dict[str, float]:
         if one.place is None:
             values.setdefault(one.key, []).append(one.value)
     return {key: mean for key, own in values.items() if (mean := float(np.mean(own)))}
-
-
-def _unconverged(result: Selection, method: str) -> str:
-    """Why a method's limit may be anything, with its errors."""
-    own = sorted((c for c in result.candidates if c.method == method), key=lambda c: -c.spacing)
-    errors = ", ".join(f"{100 * c.discretisation:.1f}" for c in own)
-    spacings = ", ".join(f"{1e3 * c.spacing:.3g}" for c in own)
-    scatters = "a length scatters from spacing to spacing instead of settling"
-    why = scatters if method in result.erratic else "its error does not fall with the spacing"
-    return f"{method}: not converged: {why} (errors {errors} % at {spacings} mm)"
 
 
 def exact_lengths(run: Run) -> dict[str, float]:

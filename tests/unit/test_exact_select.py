@@ -149,8 +149,15 @@ def test_what_no_line_explains_is_erratic(monkeypatch):
     trusting(monkeypatch, "mpm", "sph")
     wild = [run("sph", d, height_m=h) for d, h in ((1.0, 10.0), (2.0, 13.0), (4.0, 10.1))]
     found = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + wild)
-    assert found.erratic == {"sph"} and not found.converges("sph") and found.converges("mpm")
-    assert found.notes[-1].startswith("sph: not converged")
+    assert list(found.erratic) == ["sph"] and not found.converges("sph") and found.converges("mpm")
+    assert found.notes[-1] == (
+        "sph: not converged: its height neither goes with the spacing beyond chance (90 % sure) nor settles to 1 %: "
+        "10.1, 13, 10 m at 4e+03, 2e+03, 1e+03 mm"
+    )
+    for r in wild:
+        r.record.measures["bead_width_m"] = 1e-3 * r.record.measures["height_m"] ** 2
+    twice = assess(BEAD, ["sph"], wild).erratic["sph"]
+    assert twice.startswith("its bead width neither") and twice.endswith("; so 1 more of its lengths")
 
 
 def made(*rows, method="mpm", bias=0.0):
@@ -180,11 +187,28 @@ def test_order_is_the_slope_of_the_errors_that_are_not_nothing():
         ((0.01, 0.02), False),
         ((0.01, 0.002, 0.002), True),  # noise all along
         ((0.011, 0.002, 0.002), False),
+        ((0.005, 0.004, 0.08), True),  # noise at the finest
+        ((0.04, 0.02, 0.01), False),
     ],
 )
 def test_a_method_converges_when_its_error_falls_at_half_an_order(errors, converges):
     rows = [(2.0**i, 1.0, e) for i, e in enumerate(errors)]
     assert made(*rows[::-1]).converges("mpm") is converges
+
+
+@pytest.mark.parametrize(
+    ("errors", "words"),
+    [
+        ((0.01, 0.02, 0.04), ""),
+        ((0.04, 0.02, 0.03), "does not fall with the spacing"),
+        ((0.02, 0.0285, 0.0399), "hardly falls with the spacing: by an order of 0.498, and 0.5 is wanted"),
+        ((0.02, 0.022, 0.025), "hardly falls with the spacing: by an order of 0.161, and 0.5 is wanted"),
+        ((0.0203, 0.02, 0.08), "does not fall any more at the finest spacing"),
+        ((0.01, 0.02), "is known at fewer than 3 spacings"),
+    ],
+)
+def test_what_is_said_of_an_error_is_what_it_does(errors, words):
+    assert made(*((2.0**i, 1.0, e) for i, e in enumerate(errors))).slack("mpm") == words
 
 
 def test_the_front_is_what_nothing_beats_in_both():
@@ -227,7 +251,7 @@ def test_confidence_compares_the_trusted_limits(monkeypatch, limits, tolerance, 
         r.record.measures["front_x_m"] = 1.0  # and one in which all agree
     found = assess(BEAD, ["mpm", "sph", "pbd"], rows)
     assert confidence(found, tolerance, None) == sure
-    found.erratic.add("sph")
+    found.erratic["sph"] = "its height scatters"
     assert confidence(found, tolerance, None) == f"low: {sure.partition(': ')[2]}; not converged: sph"
     trusting(monkeypatch)
     assert confidence(assess(BEAD, ["mpm"], line("mpm", 10.0, 0.2)), 1.0, None).startswith("low: no method passes")

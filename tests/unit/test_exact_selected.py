@@ -67,6 +67,18 @@ def test_what_half_the_error_takes():
     assert page._further(nothing, nothing.candidates[0]).endswith("nothing but what cannot be measured")
 
 
+def test_what_half_the_error_takes_is_not_known_of_what_scatters():
+    """Its errors fall, since the scatter from a spacing down cannot rise: that it does not fall would be false."""
+    falling = made((1.0, 8.0, 0.017), (1.5, 4.0, 0.047), (2.0, 2.0, 0.094))
+    falling.erratic["mpm"] = "its height scatters"
+    words = page._further(falling, falling.candidates[0])
+    assert words == "a length of mpm scatters (see below): what a finer spacing gains is not known"
+    rising = made((1.0, 8.0, 0.04), (2.0, 4.0, 0.03), (4.0, 2.0, 0.02))
+    assert page._further(rising, rising.candidates[0]) == (
+        "the error of mpm does not fall with the spacing; a finer one promises little"
+    )
+
+
 @pytest.mark.parametrize("errors", [(0.0056, 0.0057, 0.0058, 0.006), (0.006, 0.0058, 0.0057, 0.0056), (0.005,) * 4])
 def test_an_error_that_is_noise_at_all_spacings_has_no_order(errors):
     small = made(*((2.0**i, 1.0, e) for i, e in enumerate(errors)))
