@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from statistics import median
 
 from ..errors import Obstacle, UserError
+from ..registry import get_method
 from ..runs.job import Job
 from ..runs.record import Run
 from ..scenario import Scenario
 from .afford import afford, expected, spacings
+from .estimate import estimate
 from .selection import ENOUGH, FACTORS, FINEST
 from .workplace import Workplace, cores, require_number
 
@@ -131,6 +133,8 @@ def _untried(scenario: Scenario, method: str, factors: Sequence[float], found: S
     """What there is no time for, in a line."""
     if not found:
         return [f"{method}: left out: {ENOUGH} spacings take longer than its share of the time"]
+    if estimate(found[-1], get_method(method)).refusal:
+        return []  # it takes no time, and the selection says why
     if found[-1].spacing > (1.0 + 1e-9) * factors[-1] * scenario.spacing:
         return [f"{method}: no finer than {1e3 * found[-1].spacing:.3g} mm, for want of time"]
     return []

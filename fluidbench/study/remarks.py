@@ -1,10 +1,11 @@
-"""What a selection notes of a method: why its limit may be anything."""
+"""What a selection notes of a method: why it is out, and why its limit may be anything."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from ..method.verdict import Verdict
 from ..report.table import number, readable
 from ..runs.record import Run
 from .fit import NOISE, SURE, Fit
@@ -12,6 +13,21 @@ from .lengths import lengths_of
 
 if TYPE_CHECKING:
     from .selection import Selection
+
+
+def excluded(method: str, runs: Sequence[Run], completed: int, enough: int) -> list[str]:
+    """Why a method has too few of its `runs` `completed` to be judged: refusals and instabilities with the reason of
+    the first, once each; other ends are lacking, and told as such."""
+    own = [run for run in runs if run.method == method]
+    lines = []
+    for verdict in (Verdict.REFUSED, Verdict.DIVERGED):
+        ended = sorted((run for run in own if run.verdict == verdict), key=lambda run: -run.record.spacing_m)
+        if ended:
+            where = "" if len(ended) == len(own) else f" at {_spacings([run.record.spacing_m for run in ended])}"
+            lines.append(f"{method}: {verdict}{where}: {ended[0].reason}")
+    if own and all(run.verdict == Verdict.REFUSED for run in own):
+        return lines  # that none completed goes without saying
+    return [*lines, f"{method}: only {completed} spacings completed with their volume, {enough} are needed"]
 
 
 def scattered(fits: Mapping[str, Fit], runs: Sequence[Run]) -> str:

@@ -32,7 +32,7 @@ def report(
         _findings(scenario, name, chosen, tolerance, budget, pace),
         [_candidates(chosen, front), _evidence(chosen)],
         pd.DataFrame(rows),
-        [_plot(chosen, front)],
+        [_plot(chosen, front)] if chosen.candidates else [],  # axes alone say nothing
         runs,
         machine_of(chosen.runs),
     )

@@ -30,7 +30,7 @@ from ..scenario import Scenario
 from ..scenario.measured import Measured
 from .fit import NOISE, Fit, extrapolate
 from .lengths import lengths_of
-from .remarks import scattered, unconverged
+from .remarks import excluded, scattered, unconverged
 
 FACTORS = (2.0, 1.5, 1.0, 0.75)  # spacings tried, over the scenario's
 FINEST = 0.5  # and on a GPU
@@ -192,7 +192,7 @@ def assess(
     for method in methods:
         own = [r for r in done if r.method == method]
         if len(own) < ENOUGH:
-            result.notes.append(f"{method}: only {len(own)} spacings completed with their volume, {ENOUGH} are needed")
+            result.notes += excluded(method, runs, len(own), ENOUGH)
             continue
         every = [lengths_of(r.record) for r in own]
         shared = [key for key in every[0] if all(key in lengths for lengths in every)]
@@ -219,7 +219,7 @@ def assess(
         mean = f" (mean of {len(own)})" if len(own) > 1 else ""
         result.notes.append(f"{own[0].words}: errors are from the measured {told[key]:.4g}{mean}{spread}")
     consensus, judged = _consensus(result), result.witnesses()
-    if not judged:
+    if not judged and result.limits:
         result.notes.append(f"{_nobody(result)}: the consensus is the mean of all")
     if len(judged) == 1:
         result.notes.append(

@@ -138,11 +138,32 @@ def test_an_exact_length_is_judged_against_its_answer_alone(monkeypatch):
 
 def test_two_spacings_are_not_enough(monkeypatch):
     trusting(monkeypatch, "mpm", "sph")
-    blown = [finished("sph", "diverged", spacing=4.0)]
+    blown = [finished("sph", "diverged", spacing=4.0, reason="it moves by 9 d")]
     found = assess(BEAD, ["mpm", "sph"], line("mpm", 10.0, 0.2) + line("sph", 12.0, 0.1, (1.0, 2.0)) + blown)
     assert {c.method for c in found.candidates} == {"mpm"} and list(found.limits) == ["mpm"]
-    assert found.notes[0] == "sph: only 2 spacings completed with their volume, 3 are needed"
-    assert "the consensus is mpm's own limit" in found.notes[1] and len(found.runs) == 6 and found.missing() == []
+    assert found.notes[:2] == [
+        "sph: diverged at 4e+03 mm: it moves by 9 d",
+        "sph: only 2 spacings completed with their volume, 3 are needed",
+    ]
+    assert "the consensus is mpm's own limit" in found.notes[2] and len(found.runs) == 6 and found.missing() == []
+
+
+def test_a_refusal_is_told_once_with_its_cure_and_no_consensus_of_nothing(monkeypatch):
+    """It said that none completed with its volume, and that there was a consensus of all."""
+    trusting(monkeypatch, "mpm", "sph")
+    why = "it moves too near its own sound; raise material.sound_speed"
+    runs = [finished("sph", "refused", spacing=d, reason=why) for d in (1.0, 2.0, 4.0)]
+    assert assess(BEAD, ["sph"], runs).notes == [f"sph: refused: {why}"]
+    some = assess(
+        BEAD, ["mpm"], [*line("mpm", 10.0, 0.2, (1.0, 2.0)), finished("mpm", "refused", spacing=4.0, reason=why)]
+    )
+    assert some.notes == [
+        f"mpm: refused at 4e+03 mm: {why}",
+        "mpm: only 2 spacings completed with their volume, 3 are needed",
+    ]
+    late = assess(BEAD, ["mpm"], [finished("mpm", "timeout", spacing=1.0, reason="late")])
+    assert late.notes == ["mpm: only 0 spacings completed with their volume, 3 are needed"]
+    assert late.missing() == ["line_bead, mpm, d = 1e+03 mm: timeout: late"]  # told there
 
 
 def test_what_no_line_explains_is_erratic(monkeypatch):
@@ -466,6 +487,13 @@ def test_a_pace_is_of_what_was_run():
     assert pace_of(finished("mpm", **own)) == pytest.approx(6.0 / afford.expected(BEAD, "mpm"))
     assert math.isnan(pace_of(finished("mpm", **own | {"simulated_s": 0.0})))
     assert math.isnan(pace_of(finished("mpm", "refused")))
+
+
+def test_what_is_refused_lacks_no_time(tmp_path):
+    """PBD refuses a solid that is fed in, and was said to be no finer for want of time."""
+    solid = BEAD.model_copy(update={"material": BEAD.material.model_copy(update={"youngs_modulus": 100.0})})
+    found = candidates({"bead": solid}, ["mpm", "pbd"], workplace_in(tmp_path, workers=2), within=14.0)["bead"]
+    assert [line.partition(":")[0] for line in found.untried] == ["mpm"] and found.of("pbd")
 
 
 def test_what_is_refused_takes_no_time():

@@ -109,6 +109,12 @@ def test_the_command_is_of_the_scenario_that_was_asked_for(tmp_path):
     )
 
 
+def test_without_candidates_there_is_no_empty_picture(tmp_path):
+    nothing = Selection([], {"mpm": Trust(1, 1)}, {}, [], ["mpm: refused: why"])
+    made = page.report(BEAD, "line_bead", nothing, 0.2, *ALWAYS, tmp_path)
+    assert made.plots == [] and made.findings[-1] == "mpm: refused: why"
+
+
 def test_tables_and_plot_of_the_candidates(tmp_path):
     found = made((1.0, 8.0, 0.1), (2.0, 4.0, 0.2), (4.0, 5.0, 0.4), bias=0.01)
     front = found.front()
