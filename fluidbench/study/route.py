@@ -1,6 +1,7 @@
 """The nozzle's path before anything runs: what it lays, stroke by stroke, and a picture of it."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..report.table import Table, number
 from ..scenario import Scenario, Track
 
 MOST_ROWS = 24  # strokes that a table names
+ROOM, NARROWEST = 0.06, 0.3  # about the plan, and its least width, over the path's longest edge
 
 
 def _track(scenario: Scenario) -> Track:
@@ -68,30 +70,61 @@ def _spans(track: Track) -> list[tuple[float, float]]:
 
 
 def draw(scenario: Scenario, folder: Path) -> Path:
-    """`path.png` in a folder: plan, elevation, and what the nozzle does over time."""
-    track, nozzle = _track(scenario), scenario.nozzle
-    assert nozzle is not None
+    """`path.png` in a folder: plan, elevation along the longer way, and what the nozzle does over time."""
+    write_atomically(folder / "path.png", png(picture(scenario)))
+    return folder / "path.png"
+
+
+def picture(scenario: Scenario) -> Any:
+    """That as a figure of matplotlib's."""
+    track = _track(scenario)
     figure = figure_of(11.0, 6.0)
     plan, side, clock = figure.subplot_mosaic("AB;AC", width_ratios=[1.2, 1.0]).values()
-    where, times = 1e3 * track.position, track.time
-    for axes, up in ((plan, 1), (side, 2)):
-        axes.plot(where[:, 0], where[:, up], ":", color="#888888", lw=0.9, label="travel")
-        for rows in track.strokes:
-            layer = int(track.layer[rows[0]])
-            axes.plot(where[rows, 0], where[rows, up], color=COLOURS[layer % len(COLOURS)], lw=2.2 if up == 1 else 1.6)
-    plan.plot(*where[0, :2], "o", color="black", mfc="none", label="start")
-    plan.plot(*where[-1, :2], "x", color="black", label="end")
+    extent = np.ptp(track.position, axis=0)
+    along = 0 if extent[0] >= extent[1] else 1
+    for axes, across, up in ((plan, 0, 1), (side, along, 2)):
+        _lines(axes, track, across, up)
     plan.set(title="plan: a colour a layer", xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    plan.legend(frameon=False, loc="best")
-    side.set(title="elevation", xlabel="x [mm]", ylabel="z [mm]")
+    _frame(plan, 1e3 * track.position[:, :2])
+    side.set(title="elevation", xlabel=f"{'xy'[along]} [mm]", ylabel="z [mm]")
     side.set_ylim(bottom=1e3 * scenario.domain.lower[2])
-    steps = np.repeat(times, 2)[1:-1]
-    clock.plot(steps, np.repeat(1e3 * track.speed_in, 2), color=COLOURS[0], label="nozzle")
-    clock.plot(steps, np.repeat(1e3 * nozzle.speed * track.flow_in, 2), color=COLOURS[1], label="exit")
-    clock.set(title="speeds", xlabel="time [s]", ylabel="speed [mm/s]")
-    clock.legend(frameon=False)
+    _speeds(clock, scenario)
     for axes in (plan, side, clock):
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
-    write_atomically(folder / "path.png", png(figure))
-    return folder / "path.png"
+        axes.ticklabel_format(useOffset=False)
+    handles = [*plan.get_legend_handles_labels()[0], *clock.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)  # over no path
+    return figure
+
+
+def _lines(axes: Any, track: Track, across: int, up: int) -> None:
+    """The path in two of its coordinates: strokes in the colour of their layer, travel dotted, and both ends."""
+    where = 1e3 * track.position[:, [across, up]]
+    axes.plot(*where.T, ":", color="#888888", lw=0.9, label="travel")
+    for rows in track.strokes:
+        axes.plot(*where[rows].T, color=COLOURS[int(track.layer[rows[0]]) % len(COLOURS)], lw=2.2 if up == 1 else 1.6)
+    for row, mark, label in ((0, "o", "start"), (-1, "x", "end")):
+        axes.plot(*where[row], mark, color="black", mfc="none", label=label, zorder=3, clip_on=False, ls="none")
+
+
+def _frame(axes: Any, where: np.ndarray) -> None:
+    """Limits with room about the points (n, 2), and a frame that is NARROWEST or more of its length wide."""
+    low, high = where.min(axis=0), where.max(axis=0)
+    longest = float((high - low).max()) or 1.0
+    room = np.maximum(ROOM * longest, 0.5 * (NARROWEST * longest - (high - low)))
+    axes.set_xlim(low[0] - room[0], high[0] + room[0])
+    axes.set_ylim(low[1] - room[1], high[1] + room[1])
+
+
+def _speeds(axes: Any, scenario: Scenario) -> None:
+    """Of the nozzle and of what leaves it over time, from none: else what is constant is shown by its rounding."""
+    track, nozzle = _track(scenario), scenario.nozzle
+    assert nozzle is not None
+    steps = np.repeat(track.time, 2)[1:-1]
+    speeds, exits = 1e3 * track.speed_in, 1e3 * nozzle.speed * track.flow_in
+    axes.plot(steps, np.repeat(speeds, 2), color=COLOURS[0], label="speed of the nozzle")
+    axes.plot(steps, np.repeat(exits, 2), "--", color=COLOURS[1], label="exit speed")
+    axes.set(title="speeds", xlabel="time [s]", ylabel="speed [mm/s]")
+    most = float(max(speeds.max(), exits.max()))
+    axes.set_ylim(-0.04 * most, 1.1 * most)  # what stands still is not hidden by the frame

@@ -10,7 +10,7 @@ from fluidbench.errors import UserError
 from fluidbench.scenario import gcode
 from fluidbench.scenario.library import define, load
 from fluidbench.scenario.stream import Stream
-from fluidbench.study.route import draw, route
+from fluidbench.study.route import draw, picture, route
 
 PASTE = {"density": 1000.0, "youngs_modulus": 6e3, "poisson_ratio": 0.45, "yield_stress": 60.0}
 # As FullControl 0.1.2 writes a bead 2 mm wide and 1 mm high: an L, a travel, a second line one layer up.
@@ -209,6 +209,37 @@ def test_the_path_is_told_and_drawn(tmp_path):
     assert draw(printed(tmp_path), tmp_path).read_bytes().startswith(b"\x89PNG")
     with pytest.raises(UserError, match="has no nozzle"):
         route(load("dam_break"))
+
+
+NARROW = """M83
+G0 F1200 X0 Y0 Z2
+G1 Y80 E40
+G0 Z6
+G0 X4
+G0 Z2
+G1 Y0 E40
+G0 Z6
+"""
+
+
+@pytest.mark.parametrize("text", ["M83\nG0 F1200 X0 Y0 Z2\nG1 X60 E40\n", NARROW])
+def test_the_picture_of_a_path_covers_none_of_it(tmp_path, text):
+    """A straight line's plan had no height, a narrow one's legend lay over frame and end, and constant speeds were
+    shown by their rounding, about an offset."""
+    made = printed(tmp_path, text)
+    figure = picture(made)
+    figure.draw_without_rendering()
+    plan, side, clock = figure.axes
+    (legend,) = figure.legends
+    for axes in figure.axes:
+        assert axes.get_legend() is None and not axes.get_window_extent().overlaps(legend.get_window_extent())
+        assert axes.yaxis.get_offset_text().get_text() == ""
+    (left, right), (low, high) = plan.get_xlim(), plan.get_ylim()
+    x, y, _ = 1e3 * made.track.position.T
+    assert left < x.min() and x.max() < right and low < y.min() and y.max() < high
+    assert min(right - left, high - low) >= 0.3 * max(np.ptp(x), np.ptp(y)) * (1 - 1e-9)
+    assert side.get_xlabel() == ("y [mm]" if text == NARROW else "x [mm]")
+    assert clock.get_ylim()[0] <= 0.0 and clock.get_ylim()[1] == pytest.approx(1.1 * 20.0)
 
 
 def test_legs_of_a_polyline_have_speeds_and_flows_of_their_own():
