@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .plot import Cloud, Plot
+from .plot import FADED, Cloud, Plot, Trace
 from .table import Table
 
 if TYPE_CHECKING:
@@ -84,13 +84,16 @@ def interactive(plot: Plot) -> Any:
             figure.add_scatter(
                 x=trace.x,
                 y=trace.y,
-                mode=mode,
                 name=trace.label,
                 line={"color": trace.colour, "dash": dash},
                 legendgroup=trace.colour,
                 showlegend=bool(trace.label),
                 error_y=None if trace.spread is None else {"array": trace.spread},
+                opacity=FADED if trace.faded else 1.0,
+                **({"mode": mode} | _named(plot, trace)),
             )
+    for name, i in plot.key.items():  # an entry of the legend that has no points
+        figure.add_scatter(x=[None], y=[None], mode="markers", name=f"{i} {name}", marker={"opacity": 0})
     figure.update_layout(
         title=plot.title,
         xaxis_title=plot.x,
@@ -107,6 +110,15 @@ def interactive(plot: Plot) -> Any:
     if plot.equal:
         figure.update_yaxes(scaleanchor="x", scaleratio=1)
     return figure
+
+
+def _named(plot: Plot, trace: Trace) -> dict[str, Any]:
+    """Of points with names: their numbers beside them, and the names for whoever points at them."""
+    if trace.names is None:
+        return {}
+    numbers = [str(plot.key[name]) for name in trace.names]
+    beside = {"text": numbers, "textposition": "top right", "textfont": {"color": trace.colour, "size": 10}}
+    return {"mode": "markers+text", "hovertext": trace.names, **beside}
 
 
 def turning(cloud: Cloud) -> Any:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe & Ito: distinct for colour-blind readers."""
+FADED = 0.3
+"""Opacity of what is faded."""
 LIGHTER = ("#7FC1EC", "#F3A873", "#84D7BC", "#E5BBD3", "#F2CF80", "#AADAF4", "#808080")
 """The same through another backend."""
 
@@ -33,7 +35,8 @@ def colour(label: str) -> str:
 
 @dataclass(frozen=True)
 class Trace:
-    """One line (or points, or bars) of a plot; `spread` is how uncertain each of its points is."""
+    """One line (or points, or bars) of a plot; `spread` is how uncertain each of its points is, `names` what each is,
+    told by number and a key; a `faded` one shows through."""
 
     label: str
     x: list[Any]
@@ -41,6 +44,8 @@ class Trace:
     style: str = "line"
     colour: str = "#000000"
     spread: list[float] | None = None
+    names: list[str] | None = None
+    faded: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,3 +73,9 @@ class Plot:
     traces: list[Trace] = field(default_factory=list)
     equal: bool = False
     log: bool = False
+
+    @property
+    def key(self) -> dict[str, int]:
+        """The number of every name of a point, from 1, in the order of their first points."""
+        names = dict.fromkeys(name for trace in self.traces for name in trace.names or [])
+        return {name: i for i, name in enumerate(names, 1)}

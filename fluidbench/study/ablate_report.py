@@ -69,7 +69,7 @@ def report(scenario: Scenario, name: str, given: Sequence[str], done: Ablation, 
         seen = [e for e in done.effects if e.method == method and e.ok]
         if seen:
             xs, ys = [100 * e.saved for e in seen], [100 * e.moved for e in seen]
-            plot.traces.append(Trace(method, xs, ys, "points", colour(method)))
+            plot.traces.append(Trace(method, xs, ys, "points", colour(method), names=[e.change.name for e in seen]))
     runs = {
         "every change": [
             record_link(e.run, root, f"{e.method}: {e.change.name}") for e in [*done.effects, *done.lean.values()]

@@ -14,8 +14,6 @@ from ..scenario import Scenario
 from .again import settings_of
 from .selection import FALLS, Candidate, Selection, confidence, physics_of
 
-GREY = "#bbbbbb"
-
 
 def report(
     scenario: Scenario, name: str, chosen: Selection, tolerance: float, budget: float, pace: float, root: Path
@@ -169,13 +167,16 @@ def _evidence(chosen: Selection) -> Table:
 
 
 def _plot(chosen: Selection, front: Sequence[Candidate]) -> Plot:
-    """Error against cost; what is dominated is grey."""
-    plot = Plot("pareto", "error against cost", "time [s]", "estimated error [%]", log=True)
-    rest = [c for c in chosen.candidates if c not in front]
-    if rest:
-        plot.traces.append(Trace("dominated", [c.seconds for c in rest], [100 * c.error for c in rest], "points", GREY))
-    for method in dict.fromkeys(c.method for c in front):
-        own = [c for c in front if c.method == method]
-        xs, ys = [c.seconds for c in own], [100 * c.error for c in own]
-        plot.traces.append(Trace(method, xs, ys, "line+points", colour(method)))
+    """Error against cost, a colour a method; what is dominated is faded."""
+    plot = Plot("pareto", "error against cost (faded: dominated)", "time [s]", "estimated error [%]", log=True)
+    for method in dict.fromkeys(c.method for c in [*front, *chosen.candidates]):
+        for faded in (False, True):
+            own = [
+                c for c in (chosen.candidates if faded else front) if c.method == method and (c in front) is not faded
+            ]
+            if own:
+                label = "" if any(t.colour == colour(method) for t in plot.traces) else method
+                xs, ys = [c.seconds for c in own], [100 * c.error for c in own]
+                style = "points" if faded else "line+points"
+                plot.traces.append(Trace(label, xs, ys, style, colour(method), faded=faded))
     return plot

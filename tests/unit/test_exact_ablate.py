@@ -274,6 +274,7 @@ def test_the_page_names_what_is_needed_and_the_leanest_mix(tmp_path):
     assert [t.label for t in made.plots[0].traces] == ["mpm"] and len(made.data) == 5
     assert list(made.plots[0].traces[0].x) == pytest.approx([10.0, 25.0, 0.0])
     assert list(made.plots[0].traces[0].y) == pytest.approx([20.0, 1.0, 0.0])
+    assert made.plots[0].traces[0].names == ["a", "b", "c"]
 
 
 def test_a_mistake_in_a_change_is_no_crash():

@@ -7,8 +7,9 @@ import pytest
 from matplotlib.image import imread
 
 from fluidbench.errors import UserError
-from fluidbench.report.figures import draw, figure_of
-from fluidbench.report.page import turning
+from fluidbench.report import figures
+from fluidbench.report.figures import draw, figure_of, number_points
+from fluidbench.report.page import interactive, turning
 from fluidbench.report.plot import Cloud, Plot, Trace
 from fluidbench.report.render import ruler, shown_at
 from fluidbench.report.table import in_millimetres
@@ -51,6 +52,52 @@ def test_nothing_of_a_plot_to_scale_is_cut_off(height):
     picture = imread(io.BytesIO(drawn))
     for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]):
         assert np.all(edge == 1.0)
+
+
+def numbered():
+    """Three points almost in one place, and one apart, of two methods."""
+    near = Trace(
+        "mpm", [1.0, 1.001, 1.002], [2.0, 2.001, 2.0], "points", "#0072B2", names=["softer", "larger dt", "no yield"]
+    )
+    return Plot("p", "p", "x", "y", [near, Trace("sph", [5.0], [9.0], "points", "#D55E00", names=["larger dt"])])
+
+
+def test_points_with_names_have_numbers_that_cover_nothing_and_a_key(monkeypatch):
+    plot, seen = numbered(), []
+    assert plot.key == {"softer": 1, "larger dt": 2, "no yield": 3} and Plot("p", "p", "x", "y").key == {}
+    monkeypatch.setattr(figures, "number_points", lambda *given: seen.extend(number_points(*given)))
+    assert draw(plot)[:4] == b"\x89PNG"
+    assert [(note.get_text(), note.get_color()) for note in seen] == [
+        *((text, "#0072B2") for text in "123"),
+        ("2", "#D55E00"),
+    ]
+    axes = seen[0].axes
+    boxes = [note.get_window_extent() for note in seen]
+    points = [axes.transData.transform(xy) for t in plot.traces for xy in zip(t.x, t.y, strict=True)]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert not any(box.contains(*point) for box in boxes for point in points)
+    (key,) = [text.get_text() for text in axes.texts if text not in seen]
+    assert key.splitlines() == ["1  softer", "2  larger dt", "3  no yield"]
+
+
+def test_points_with_names_have_them_on_the_page_too():
+    near, apart, *key = interactive(numbered()).data
+    assert list(near.text) == ["1", "2", "3"] and list(near.hovertext) == ["softer", "larger dt", "no yield"]
+    assert list(apart.text) == ["2"] and near.mode == "markers+text"
+    assert [entry.name for entry in key] == ["1 softer", "2 larger dt", "3 no yield"]
+
+
+def test_what_is_faded_keeps_its_colour():
+    plain, faded = (
+        interactive(Plot("p", "p", "x", "y", [Trace("mpm", [1.0], [1.0], "points", "#0072B2", faded=faded)])).data[0]
+        for faded in (False, True)
+    )
+    assert (plain.opacity, faded.opacity) == (1.0, 0.3) and plain.line.color == faded.line.color == "#0072B2"
+    at = imread(
+        io.BytesIO(draw(Plot("p", "p", "x", "y", [Trace("mpm", [1.0], [1.0], "points", "#0072B2", faded=True)])))
+    )
+    mixed = 1.0 - 0.3 * (1.0 - np.array([0x00, 0x72, 0xB2]) / 255)
+    assert np.any(np.all(np.abs(at[..., :3] - mixed) < 0.01, axis=-1))
 
 
 def frame(speeds, births):

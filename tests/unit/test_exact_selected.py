@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from fluidbench.report.plot import colour
 from fluidbench.scenario.library import load, shipped
 from fluidbench.study import select_report as page
 from fluidbench.study.selection import Candidate, Selection, Trust
@@ -123,8 +124,13 @@ def test_tables_and_plot_of_the_candidates(tmp_path):
     assert [row[1] for row in rows] == ["2000", "4000", "1000"] and [row[-1] for row in rows] == ["yes", "-", "yes"]
     found.trust["sph"] = Trust(1, 4)
     assert page._evidence(found).rows == [["mpm", "1", "1 of 1", "yes"], ["sph", "nan", "1 of 4", "no"]]
-    dominated, best = page._plot(found, front).traces
+    best, dominated = page._plot(found, front).traces
     assert (list(dominated.x), list(dominated.y)) == ([5.0], [pytest.approx(41.0)])
+    assert (best.label, best.faded, dominated.label, dominated.faded) == ("mpm", False, "", True)  # told once
+    assert dominated.colour == best.colour == colour("mpm")
+    sph = made((1.0, 9.0, 0.9), method="sph").candidates
+    never = page._plot(Selection([*found.candidates, *sph], {}, {}, []), front).traces[-1]
+    assert (never.label, never.colour, never.faded, never.style) == ("sph", colour("sph"), True, "points")
     assert (list(best.x), list(best.y)) == ([4.0, 8.0], pytest.approx([21.0, 11.0]))
     for c in found.candidates:
         change(c.run, machine={"cores": "2"})
