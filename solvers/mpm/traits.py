@@ -39,6 +39,7 @@ class TraitsMPM(Solver):
     }
 
     typical_rate, typical_bytes = 4.0e6, 4000.0
+    bare: ClassVar = {"viscosity": "explicit"}  # `auto` makes a thick block implicit, whose limit is another
     axes: ClassVar = (NumericalAxis("particles_per_cell", "grid_ratio", (1, 2, 4, 8, 27), (1, 8, 27), "-", 1 / 3),)
 
     @classmethod

@@ -43,6 +43,7 @@ class TraitsSPH(Solver):
         "artificial_viscosity_solid": 0.0,
         "hourglass": 0.0,
         "shifting": 0.0,
+        "viscosity": "explicit",  # `auto` makes a thick block implicit, whose limit is another
     }
 
     @classmethod

@@ -66,7 +66,7 @@ def test_theory_of_sph_is_the_fourier_analysis_at_its_smoothing_length():
 
 def test_bare_is_without_what_theory_does_not_know():
     assert {name: get_method(name).bare for name in ("mpm", "sph", "pbd")} == {
-        "mpm": {},
+        "mpm": {"viscosity": "explicit"},
         "pbd": {},
         "sph": dict.fromkeys(
             (
@@ -78,7 +78,8 @@ def test_bare_is_without_what_theory_does_not_know():
                 "shifting",
             ),
             0.0,
-        ),
+        )
+        | {"viscosity": "explicit"},
     }
     assert BLOCKS["acoustic"] == {"density": 1000.0, "sound_speed": 10.0}
 
