@@ -1,7 +1,7 @@
 """G-code as slicers write it: where the nozzle goes, how fast, and how much it extrudes on the way.
 
 A reader of our own, strict where gcodeparser 0.3 is not: that one cannot read `X10.`, takes an X in the text of a
-message for a move, and `X1O` for X1.
+message for a move, and `X1O` for X1. Its words and their exponents: gcode_words.
 """
 
 import math
@@ -14,12 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import quoted
+from .gcode_words import UNCOMMANDED, commands_in, words_in
 
-COMMAND = re.compile(r"([GMT])(\d+(?:\.\d+)?)(?=\W|[A-Z]|$)(.*)", re.DOTALL)
-NUMBER = r"([+-]?(?:\d+\.?\d*|\.\d+))"
-WORDS = re.compile(rf"(?:\s*[A-Z]\s*{NUMBER}?(?=[\sA-Z]|$))*\s*")
-NUMBERED = re.compile(rf"(?:\s*[A-Z]\s*{NUMBER})+\s*")
-WORD = re.compile(rf"([A-Z])\s*{NUMBER}?")
+COMMAND = re.compile(r"([GMTgmt])(\d+(?:\.\d+)?)(?=\W|[A-Za-z]|$)(.*)", re.DOTALL)
 COMMENT = re.compile(r"\([^)]*\)|;.*")
 ENVELOPE = re.compile(r"^\s*(?:N\d+\s*)?(.*?)\s*(?:\*\d+)?\s*$", re.DOTALL)  # line number, checksum
 LARGEST = 2**26  # bytes of a file
@@ -79,8 +76,9 @@ def understand(text: str, name: str = "G-code") -> Program:
         code = "" if found is None else found[1].strip()
         if code and code != "%":
             try:
-                for command in _commands(code.upper()):
-                    _obey(machine, command, number)
+                said: dict[str, float | None] = {}
+                for command in commands_in(code):
+                    _obey(machine, command, number, said)
             except ValueError as error:
                 raise ValueError(f"{name}, line {number}: {error}") from None
     if not machine.moves:
@@ -90,38 +88,41 @@ def understand(text: str, name: str = "G-code") -> Program:
     return Program(points, table[:, 3], table[:, 4], table[:, 5], table[:, 6] > 0, machine.ignored)
 
 
-def _commands(code: str) -> list[str]:
-    """The commands of a line, in its order, where all of it is words such as X10.5; else the line, whose text may be
-    anything (M117)."""
-    return [part for part in re.split(r"(?=[GMT]\s*\d)", code) if part] if NUMBERED.fullmatch(code) else [code]
-
-
-def _obey(m: _Machine, code: str, number: int) -> None:
-    """One command, without comments and in capitals."""
+def _obey(m: _Machine, code: str, number: int, said: dict[str, float | None]) -> None:
+    """One command, without comments; `said`: the words of those before it in its line."""
     found = COMMAND.fullmatch(code)
     if found is None:
-        if re.fullmatch(rf"(?:[XYZEF]\s*{NUMBER}\s*)+", code):
+        if UNCOMMANDED.fullmatch(code):
             raise ValueError(f"{quoted(code)} has no command; write G1 before it")
-        m.ignored.setdefault(code, []).append(number)  # macros of a firmware, such as SET_PRESSURE_ADVANCE
+        m.ignored.setdefault(code.upper(), []).append(number)  # macros of a firmware, such as SET_PRESSURE_ADVANCE
         return
-    name = found[1] + (found[2].lstrip("0") or "0")
+    name = found[1].upper() + (found[2].lstrip("0") or "0")
     if name in UNREADABLE:
         raise ValueError(f"{name}: {UNREADABLE[name]} cannot be read; G0, G1, G2 and G3 in the plane can")
     act = ACTIONS.get(name)
     if act is None and name not in MODES:
-        m.ignored.setdefault(code, []).append(number)
+        m.ignored.setdefault(code.upper(), []).append(number)
         return
-    if not WORDS.fullmatch(found[3]):
-        raise ValueError(f"{quoted(found[3].strip())} are no words such as X10.5")
-    words = {letter: None if value == "" else float(value) for letter, value in WORD.findall(found[3])}
-    if second := [letter for letter in words if letter in "GMT"]:
-        raise ValueError(f"{name} and a second command, {second[0]}, beside words without a number; write two lines")
-    if strange := [letter for letter in words if letter not in LETTERS.get(name, words)]:
-        raise ValueError(f"{name} has no word {quoted(strange[0])}; it has {', '.join(LETTERS[name])}")
+    words = _words(name, found[3], said)
     if name in MODES:
         _switch(m, name)
     elif act is not None:
         act(m, words)
+
+
+def _words(name: str, text: str, said: dict[str, float | None]) -> dict[str, float | None]:
+    """The words of a command by their letters, added to what its line has `said` before."""
+    words: dict[str, float | None] = {}
+    for letter, value in words_in(text):
+        if letter in "GMT":
+            raise ValueError(f"{name} and a second command, {letter}, beside words without a number; write two lines")
+        if letter not in LETTERS.get(name, letter):
+            raise ValueError(f"{name} has no word {quoted(letter)}; it has {', '.join(LETTERS[name])}")
+        if letter in said:
+            twice = " and ".join(letter if v is None else f"{letter}{v:g}" for v in (said[letter], value))
+            raise ValueError(f"{letter} is there twice, {twice}; a line may have each word once")
+        words[letter] = said[letter] = value
+    return words
 
 
 def _switch(m: _Machine, name: str) -> None:

@@ -67,6 +67,42 @@ def test_extrusion_absolute_relative_and_drawn_back():
 
 
 @pytest.mark.parametrize(
+    ("line", "at", "fed"),
+    [
+        ("G1 X1e-05 Y5 E2", (1e-5, 5), 2),  # as Python writes what is nearly nothing
+        ("G1 X1E-05 Y5 E2", (1e-5, 5), 2),
+        ("g1 x1e-05 y5 e2", (1e-5, 5), 2),
+        ("G1 X1.5e+01 Y5e0 E2", (15, 5), 2),
+        ("G1 X1e-05Y5E2", (1e-5, 5), 2),
+        ("G1X1e-10Y5E2", (1e-10, 5), 2),
+        ("G1X1e-05E2Y5", (1e-5, 5), 2),
+        ("G1 X1e-05E2 Y5", (1e-5, 5), 2),  # a number has one exponent
+        ("G1 X10 Y-.5e1 E.2E+1", (10, -5), 2),
+        ("G1 X10 Y5 E2e-05", (10, 5), 2e-5),
+        ("G1X10Y5E2.5", (10, 5), 2.5),  # as slicers write a line without blanks
+        ("G1 X10E2.5 Y5", (10, 5), 2.5),
+        ("G1 Y5 X10E.5", (10, 5), 0.5),
+        ("G1X10E5Y5", (10, 5), 5),
+        ("G1 X10Y5E5", (10, 5), 5),
+        ("g1x10y5e12", (10, 5), 12),
+        ("G1 X10 Y5 E12", (10, 5), 12),
+        ("G1 X10 Y5 e12", (10, 5), 12),
+        ("G1 X 10 Y 5 E 12", (10, 5), 12),
+    ],
+)
+def test_an_e_is_a_word_or_an_exponent(line, at, fed):
+    program = gcode.understand(f"M83\nG1 F6e2\n{line}")
+    assert program.points[-1] == pytest.approx([1e-3 * at[0], 1e-3 * at[1], 0], abs=1e-15)
+    assert program.fed.tolist() == pytest.approx([fed], rel=1e-12)
+    assert program.seconds.tolist() == pytest.approx([math.hypot(*at) / 10.0])
+
+
+def test_an_e_right_behind_a_command_is_a_word():
+    back = "M83\nG1 F600\n{}\nG1E5\nG1 X1 E2"
+    assert [gcode.understand(back.format(word)).fed.tolist() for word in ("G1E-5", "G1E-05", "g1e-5")] == [[2]] * 3
+
+
+@pytest.mark.parametrize(
     ("text", "middle", "length"),
     [
         ("G3 X0 Y20 I0 J10", (10, 10), math.pi * 10),  # half a circle about (0, 10), counterclockwise
@@ -106,6 +142,16 @@ def test_an_arc_may_rise():
         ("G1 F600\nG4 S-1", "less than nothing"),
         ("G28 X G1 X5 F600", "a second command, G"),
         ("; nothing", "no line of it moves anything"),
+        ("G1 F600\nG1 X10E5", "line 2: X10E5 may be X10 and E5, or one number with an exponent; write a blank"),
+        ("G1 F600\nG1 X10E-5 Y2", "line 2: X10E-5 may be X10 and E-5"),
+        ("G1 F600\ng1 x1e5", "line 2: x1e5 may be x1 and e5"),
+        ("G1 F600\ng1x1e-10", "line 2: x1e-10 may be x1 and e-10"),
+        ("G1 F600\nG1 X1e400", "line 2: 'X1e400' is beyond any physics"),
+        ("G1 F600\nG1 X1e30", "line 2: 'X1e30' is beyond any physics"),
+        ("G1 X10 X20 F600", "line 1: X is there twice, X10 and X20"),
+        ("G1 F600\nG1 X50 E53 G1 X60 E5", "line 2: X is there twice, X50 and X60"),
+        ("G1 F600\nG28 X X", "line 2: X is there twice, X and X"),
+        ("G1X1E2E3F600", "line 1: E is there twice, E2 and E3"),
     ],
 )
 def test_what_cannot_be_understood_is_said_with_its_line(text, words):
