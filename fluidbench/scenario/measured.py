@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
@@ -66,6 +66,9 @@ class Measured(Model):
         return name if self.place is None else f"{name} at {1e3 * self.place:g} mm"
 
 
+Wanting = Callable[[Measured], str | None]
+
+
 def key_of(quantity: str, layered: bool) -> str:
     """The name of a measure, without its layer; raises ValueError for one that no run has."""
     name = quantity.strip().lower().replace(" ", "_")
@@ -84,8 +87,9 @@ def unit_of(key: str) -> str:
     return {"m": "m", "m2": "m^2"}.get(key.rpartition("_")[2], "")
 
 
-def read(path: str | Path) -> tuple[Measured, ...]:
-    """A table of measured values: quantity, value and, where known, uncertainty, layer, place and source.
+def read(path: str | Path, wanting: Wanting | None = None) -> tuple[Measured, ...]:
+    """A table of measured values: quantity, value and, where known, uncertainty, layer, place and source. `wanting`
+    says of a row why it cannot be compared, or None.
 
     Raises UserError naming file and line of whatever is wrong.
     """
@@ -109,7 +113,7 @@ def read(path: str | Path) -> tuple[Measured, ...]:
         raise UserError(f"{path}, line {first}: the column {missing[0]} is missing")
     if not rows:
         raise UserError(f"{path}: it names columns and has no rows")
-    return tuple(_row(head, row, f"{path}, line {number}") for number, row in rows)
+    return tuple(_row(head, row, f"{path}, line {number}", wanting) for number, row in rows)
 
 
 def _lines(text: str, path: str | Path) -> Iterator[tuple[int, list[str]]]:
@@ -124,14 +128,17 @@ def _lines(text: str, path: str | Path) -> Iterator[tuple[int, list[str]]]:
                 raise UserError(f"{path}, line {number}: {error}") from None
 
 
-def _row(head: list[str], row: list[str], where: str) -> Measured:
+def _row(head: list[str], row: list[str], where: str, wanting: Wanting | None) -> Measured:
     if len(row) != len(head):
         raise UserError(f"{where}: {len(row)} values in {len(head)} columns")
     table = {key: value.strip() for key, value in zip(head, row, strict=True) if value.strip()}
     try:
-        return Measured.model_validate(table)
+        made = Measured.model_validate(table)
     except ValidationError as error:
         found = error.errors(include_url=False, include_context=False)[0]
         key = ".".join(map(str, found["loc"]))
         said = str(found["msg"]).removeprefix("Value error, ")
         raise UserError(f"{where}: {f'{key}: ' if key else ''}{said[0].lower()}{said[1:]}") from None
+    if wanting is not None and (reason := wanting(made)):
+        raise UserError(f"{where}: {reason}")
+    return made

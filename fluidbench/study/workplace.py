@@ -145,11 +145,19 @@ def as_scenario(given: Scenario | str | Path, quick: bool = False) -> Scenario:
 
 
 def measured_of(scenario: Scenario, more: str | Path | Sequence[Measured]) -> tuple[Measured, ...]:
-    """What was measured: what the scenario has, and a table in a file, or rows of one."""
+    """What was measured: what the scenario has, and a table in a file, or rows of one. Raises UserError for a row that
+    no run of the scenario can have, with its line or its number."""
+    from ..measure.beside import wanting
+
     rows = isinstance(more, Sequence) and all(isinstance(one, Measured) for one in more)
     if not rows and not isinstance(more, str | Path):
         raise UserError(f"measured: a file, or rows of one, are wanted (got {quoted(more)})")
-    return (*scenario.measured, *(read_measured(more) if isinstance(more, str | Path) else more))
+    for own in (scenario.measured, () if isinstance(more, str | Path) else more):
+        for i, one in enumerate(own):
+            if reason := wanting(one, scenario):
+                raise UserError(f"measured.{i}: {reason}")
+    read = read_measured(more, lambda one: wanting(one, scenario)) if isinstance(more, str | Path) else more
+    return (*scenario.measured, *read)
 
 
 def names_of(given: Any, what: str) -> list[Any] | None:

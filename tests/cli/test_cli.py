@@ -107,17 +107,19 @@ def test_two_backends_are_two_rows_with_cost_ratio_and_the_same_lengths(tmp_path
 
 
 def test_measurements_stand_beside_runs_that_do_not_depend_on_them(tmp_path):
-    (tmp_path / "m.csv").write_text(
-        "quantity, place, value, uncertainty\nwidth, , 16 mm, 1 mm\nwidth, 45 mm, 16 mm, 1 mm\n"
-    )
+    row = "quantity, place, value, uncertainty\nwidth, , 16 mm, 1 mm\nwidth, {}, 16 mm, 1 mm\n"
+    (tmp_path / "m.csv").write_text(row.format("15 mm"))
+    (tmp_path / "far.csv").write_text(row.format("45 mm"))
     arguments = ["compare", "line_bead", *TINY, "--solvers", "mpm", "--out", str(tmp_path / "out")]
+    far = fluidbench(*arguments, "--measured", str(tmp_path / "far.csv"))
+    assert far.returncode == 2 and "far.csv, line 3: place: beads are measured from 0 to 30 mm" in far.stderr
+    assert not (tmp_path / "out").exists()  # refused before anything runs
     plain = fluidbench(*arguments)
     told = fluidbench(*arguments, "--measured", str(tmp_path / "m.csv"))
     assert plain.returncode == told.returncode == 0, told.stdout + told.stderr
     assert "Against measurements" not in plain.stdout and "reused" in told.stderr
     rows = [line for line in told.stdout.splitlines() if "16 ± 1" in line]
-    assert len(rows) == 2 and " u)" in rows[0] and "-" in rows[1]  # its path is shorter
-    assert "not compared: mpm has no bead width at 45 mm" in told.stdout
+    assert len(rows) == 2 and all(" u)" in line for line in rows)
     assert (tmp_path / "out" / "measured.png").exists()
 
 

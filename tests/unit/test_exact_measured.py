@@ -1,5 +1,7 @@
 """Measured numbers: what a table may say, and how runs stand beside it."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -8,12 +10,15 @@ from fluidbench.measure.beside import computed
 from fluidbench.runs.job import Job
 from fluidbench.scenario.library import load
 from fluidbench.scenario.measured import OF_ALL, Measured, read
+from fluidbench.study.compare import compare
 from fluidbench.study.compare_measured import against_measured, measured_plot, points_along, values_of
 from fluidbench.study.lengths import LENGTHS
+from fluidbench.study.select import select
 from fluidbench.study.selection import assess
+from fluidbench.study.workplace import measured_of
 
 from ..conftest import bead
-from .made import finished
+from .made import finished, working
 
 TABLE = """\ufeff# a print of ours
 Quantity, layer, place, value, uncertainty, source
@@ -132,6 +137,53 @@ def test_places_along_the_path_are_read_off_the_section_there(monkeypatch):
     ]
     (trace,) = points_along("width", rows)
     assert (trace.x, trace.y, trace.spread) == ([45.0], [16.0], [1.0]) and points_along("height", rows) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "words"),
+    [
+        ("line_bead", "width,,95 mm", "place: beads are measured from 0 to 90 mm along the path (got 95 mm)"),
+        ("line_bead", "width,2,", "layer: the scenario has 1 layer (got 2)"),
+        ("line_bead", "width,1,", "layer: layer 1 width is of layers on top of each other"),
+        ("line_bead", "top,,", None),
+        ("line_bead", "width,,90 mm", None),
+        ("line_bead", "print height,,", "quantity: print height is of layers on top of each other"),
+        ("line_bead", "slump,,", "quantity: slump is of a cylinder that is there at the start"),
+        ("wall", "level,3,", None),
+        ("wall", "height,2,", None),
+        ("wall", "level,4,", "layer: the scenario has 3 layers (got 4)"),
+        ("wall", "height,1,", "layer: a layer's height is its rise above the one below, from layer 2 on"),
+        ("wall", "drift,2,", "quantity: layer 2 drift is of a ring"),
+        ("wall", "ring drift,,", "quantity: ring drift is of a ring"),
+        ("ring_tower", "drift,2,", None),
+        ("ring_tower", "ring drift,,", None),
+        ("column_slump", "slump,,", None),
+        ("column_slump", "width,,1 mm", "quantity: bead width at 1 mm is of a bead, and the scenario has no path"),
+        ("column_slump", "front_x,,", "quantity: front x is of a box"),
+        ("column_slump", "level,1,", "layer: the scenario has no layers (got 1)"),
+        ("dam_break", "front_x,,", None),
+    ],
+)
+def test_what_no_run_of_a_scenario_has_is_refused_with_its_line(tmp_path, name, row, words):
+    (tmp_path / "m.csv").write_text(f"# ours\nquantity,layer,place,value\ntop,,,1\n{row},1\n")
+    if words is None:
+        assert len(measured_of(load(name), tmp_path / "m.csv")) == 2
+        return
+    with pytest.raises(UserError, match=re.escape(f"m.csv, line 4: {words}")):
+        measured_of(load(name), tmp_path / "m.csv")
+    rows = read(tmp_path / "m.csv")
+    for scenario, more in ((load(name), rows), (load(name).model_copy(update={"measured": rows}), ())):
+        with pytest.raises(UserError, match=re.escape(f"measured.1: {words}")):
+            measured_of(scenario, more)
+
+
+def test_it_is_refused_before_anything_runs(tmp_path, monkeypatch):
+    calls = working(monkeypatch, lambda work: None)
+    (tmp_path / "m.csv").write_text("quantity,layer,value\nwidth,9,1\n")
+    for study in (compare, select):
+        with pytest.raises(UserError, match="line 2: layer: the scenario has 1 layer"):
+            study("line_bead", measured=tmp_path / "m.csv", out=tmp_path / "out", progress=False)
+    assert not calls and not (tmp_path / "out").exists()
 
 
 def test_select_counts_errors_from_what_was_measured():
