@@ -62,7 +62,7 @@ def read(path: Path) -> Program:
     try:
         if path.stat().st_size > LARGEST:
             raise ValueError(f"{path.name}: {path.stat().st_size} bytes; {LARGEST} at most are read")
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise ValueError(f"{quoted(str(path))}: {error.strerror}") from None
     return understand(text, path.name)

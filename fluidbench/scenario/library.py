@@ -150,7 +150,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     try:
         if path.stat().st_size > LARGEST:
             raise UserError(f"{path}: {path.stat().st_size} bytes are no scenario; {LARGEST} at most")
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # TOML's and Unicode's errors are values'
         raise UserError(f"{path}: not valid TOML: {_short(error)}") from None
     except OSError as error:

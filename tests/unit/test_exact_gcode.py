@@ -208,6 +208,13 @@ def test_a_file_lies_beside_the_scenario_that_names_it(tmp_path, monkeypatch):
     assert load("b.toml").track.position[0].tolist() == pytest.approx([0.02, 0.01, 0.002])
 
 
+def test_a_file_may_begin_with_the_mark_of_an_editor(tmp_path):
+    """Else its first line, here the one that makes E relative, would be none that is known."""
+    (tmp_path / "a.gcode").write_text("M83\nG1 F600\nG1 X1 E2\nG1 X2 E2", encoding="utf-8-sig")
+    found = gcode.read(tmp_path / "a.gcode")
+    assert found.fed.tolist() == [2, 2] and not found.ignored
+
+
 def test_what_e_counts(tmp_path):
     """As filament of 2 mm, as mm^3, or not at all."""
     total = 41.575169 * 2 + 24.945101

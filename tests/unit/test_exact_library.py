@@ -44,6 +44,13 @@ def test_a_file_is_of_bounded_size(tmp_path):
         load(path)
 
 
+def test_a_file_may_begin_with_the_mark_of_an_editor(tmp_path):
+    """The byte order mark that editors on Windows write before UTF-8; in a scenario, and in what it extends."""
+    (tmp_path / "base.toml").write_text(library.find("line_bead").read_text(), encoding="utf-8-sig")
+    (tmp_path / "mine.toml").write_text('extends = "base.toml"\nspacing = "1 mm"\n', encoding="utf-8-sig")
+    assert load(tmp_path / "mine.toml").spacing == 1e-3
+
+
 def test_quick_takes_the_files_own_table_or_a_third_more_spacing(tmp_path):
     text = library.find("line_bead").read_text()
     (tmp_path / "own.toml").write_text(text + "\n[quick]\nduration = 1.5\n[quick.material]\ndensity = 7.0\n")
