@@ -51,9 +51,15 @@ def find(reference: str | Path) -> Path:
         return known[str(reference)]
     if path.suffix == ".toml" or there:
         if not is_file:
-            raise UserError(f"no such scenario file: {quoted(str(path))}")
+            raise UserError(_no_file(path) if there else f"no such scenario file: {quoted(str(path))}")
         return path
     raise UserError(f"no scenario named {quoted(str(reference))}{suggestion(str(reference), known)}")
+
+
+def _no_file(path: Path) -> str:
+    """What is there instead of a file."""
+    what = "a folder" if path.is_dir() else "no regular file"
+    return f"{quoted(str(path))} is {what}; a shipped scenario's name or a TOML file is wanted"
 
 
 def _why(error: Exception) -> str:

@@ -15,8 +15,13 @@ def test_a_file_is_found_by_name_or_path(tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text("")
     assert find("mine.toml").name == "mine.toml" and find(tmp_path / "mine.toml") == tmp_path / "mine.toml"
     (tmp_path / "folder.toml").mkdir()
-    for wrong in ("none.toml", "folder.toml"):
-        with pytest.raises(UserError, match="no such scenario file"):
+    for wrong, words in (
+        ("none.toml", "no such scenario file: 'none.toml'"),
+        ("folder.toml", "'folder.toml' is a folder"),
+        (".", "'.' is a folder; a shipped scenario's name or a TOML file is wanted"),
+        ("/dev/null", "'/dev/null' is no regular file"),
+    ):
+        with pytest.raises(UserError, match=words):
             find(wrong)
     with pytest.raises(UserError, match="is no file name"):
         find("x" * 5000)
