@@ -167,7 +167,12 @@ class Drive:
         certain = self.rests is None and wall > min(PACE_SECONDS, limit) and expected > 2.0 * limit
         if wall > limit or certain:
             return (
-                f"stopped at t = {now:.4g} s after {wall:.0f} s: at this pace the run takes at least {expected:.0f} s, "
-                f"the limit is {limit:.0f} s"
+                f"stopped at t = {now:.4g} s after {_shown(wall)} s: at this pace the run takes at least "
+                f"{_shown(expected)} s, the limit is {_shown(limit)} s"
             )
         return None
+
+
+def _shown(seconds: float) -> str:
+    """Whole seconds, and of fewer than 10 two digits."""
+    return f"{seconds:.0f}" if seconds >= 10.0 else f"{seconds:.2g}"

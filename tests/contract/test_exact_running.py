@@ -1,6 +1,7 @@
 """The loop by hand, with the smallest method there is: ticks, outputs, bounds, verdicts, limits of time, resumption."""
 
 import itertools
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -141,10 +142,25 @@ def test_a_run_is_stopped_when_it_cannot_make_it(wall, done, limit, late):
     assert Drive(SimpleNamespace(now=done / 100), made, outcome=Outcome(wall=wall)).too_slow() is None
     assert (words is not None) is late
     if late:
-        assert words == (
-            f"stopped at t = {done / 100:g} s after {wall:.0f} s: at this pace the run takes at least "
-            f"{wall * 100 / done:.0f} s, the limit is {limit:.0f} s"
-        )
+        assert words is not None
+        found = re.fullmatch(r"stopped at t = (\S+) s after (\S+) s: .* at least (\S+) s, the limit is (\S+) s", words)
+        assert found is not None and float(found[1]) == done / 100
+        told = [float(text) for text in found.groups()[1:]]
+        assert told == pytest.approx([wall, wall * 100 / done, limit], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("wall", "limit", "words"),
+    [
+        (0.0234, 0.01, "after 0.023 s: at this pace the run takes at least 0.023 s, the limit is 0.01 s"),
+        (9.94, 2.5, "after 9.9 s: at this pace the run takes at least 9.9 s, the limit is 2.5 s"),
+        (123.4, 60.0, "after 123 s: at this pace the run takes at least 123 s, the limit is 60 s"),
+    ],
+)
+def test_times_are_told_in_digits_that_mean_something(wall, limit, words):
+    made = SimpleNamespace(schedule=(0.01, 100, 10))
+    told = Drive(SimpleNamespace(now=1.0), made, wall_limit=limit, outcome=Outcome(wall=wall)).too_slow()
+    assert told == f"stopped at t = 1 s {words}"
 
 
 @pytest.mark.parametrize(("wall", "late"), [(8.1, False), (9.9, False), (10.1, True)])
@@ -159,7 +175,7 @@ def test_a_run_without_time_times_out_and_shows_no_more():
         sim, seen = falling(output_interval=interval), []
         outcome = drive(sim, lambda s, _, seen=seen: seen.append(s.done), wall_limit=0.0)
         assert outcome.verdict is Verdict.TIMEOUT and outcome.time == 0.125 and sim.done == 1 and seen == shown
-        assert outcome.reason.startswith("stopped at t = 0.125 s after 0 s")
+        assert re.match(r"stopped at t = 0\.125 s after \S+ s: .* the limit is 0 s", outcome.reason)
 
 
 def test_what_breaks_ends_the_run_with_its_time_and_its_reason():
