@@ -5,9 +5,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from ..errors import UserError, quoted, suggestion
+from .mistakes import short, told
 from .numerics import check_numerics
 from .scenario import Scenario
 from .units import in_si
@@ -115,8 +116,8 @@ def validate(table: dict[str, Any], where: str) -> Scenario:
     try:
         scenario = Scenario.model_validate(table)
     except ValidationError as error:
-        found = error.errors(include_url=False, include_context=False)
-        lines = list(dict.fromkeys(_explain(item, where) for item in found[:MOST_LINES]))
+        found = told(error.errors(include_url=False))
+        lines = list(dict.fromkeys(f"{where}: {line}" for line in found[:MOST_LINES]))
         more = [f"{where}: and {len(found) - MOST_LINES} more mistakes"] if len(found) > MOST_LINES else []
         raise UserError("\n".join([*lines, *more])) from None
     except (ArithmeticError, MemoryError, RecursionError) as error:
@@ -158,7 +159,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
             raise UserError(f"{path}: {path.stat().st_size} bytes are no scenario; {LARGEST} at most")
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # TOML's and Unicode's errors are values'
-        raise UserError(f"{path}: not valid TOML: {_short(error)}") from None
+        raise UserError(f"{path}: not valid TOML: {short(error)}") from None
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     own = table.get("toolpath")
@@ -179,12 +180,6 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     return _merge(_read(further, (*seen, path)), table)
 
 
-def _short(error: Exception) -> str:
-    """What an error says, on one line of bearable length."""
-    text = " ".join(str(error).split())
-    return text if len(text) <= 450 else f"{text[:450]}..."
-
-
 def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
     """`change` over `base`: tables merge key by key, anything else is replaced."""
     merged = dict(base)
@@ -200,8 +195,11 @@ def assign(table: dict[str, Any], key: str, value: Any) -> None:
     if len(parents) > DEEPEST or not all((*parents, last)):
         raise UserError(f"--set {quoted(key)}: keys are names joined by dots, such as material.yield_stress")
     node: Any = table
-    for part in parents:
-        node = node[_position(node, part, key)] if isinstance(node, list | tuple) else node.setdefault(part, {})
+    for i, part in enumerate(parents):
+        if isinstance(node, list | tuple):
+            node = node[_position(node, part, key)]
+        else:  # `bodies.0.kind` begins the list of bodies where there is none
+            node = node.setdefault(part, [{}] if parents[i + 1 : i + 2] == ["0"] else {})
         if not isinstance(node, dict | list):
             raise UserError(f"--set {key}: {quoted(part)} is a value, not a table")
     if isinstance(node, list):
@@ -216,37 +214,3 @@ def _position(node: list[Any] | tuple[Any, ...], part: str, key: str) -> int:
     if not (part.isascii() and part.isdigit()) or len(part) > 9 or int(part) >= len(node):
         raise UserError(f"--set {key}: {quoted(part)} must be a number below {len(node)}")
     return int(part)
-
-
-def _explain(item: Any, where: str) -> str:
-    """One pydantic error in words."""
-    path = [str(part) for part in item["loc"] if not str(part).startswith(("literal[", "function-", "tagged"))]
-    path = path or [str(part) for part in item["loc"]]
-    key = quoted(".".join(path))[1:-1] or "scenario"
-    if item["type"] == "extra_forbidden":
-        return f"{where}: unknown key '{key}'{suggestion(path[-1], _fields_at(path[:-1]))}"
-    if item["type"] == "missing":
-        return f"{where}: '{key}' is missing"
-    message = _short(item["msg"]).removeprefix("Value error, ")
-    got = "" if item["type"] == "value_error" else f" (got {quoted(item['input'])})"
-    return f"{where}: {key}: {message[0].lower()}{message[1:]}{got}"
-
-
-def _fields_at(path: list[str]) -> list[str]:
-    """The keys that the model at `path` knows."""
-    model: Any = Scenario
-    for part in path:
-        field = None if part.isdigit() else model.model_fields.get(part)
-        if field is not None:
-            model = _model_in(field.annotation) or model
-    return list(model.model_fields)
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """The first model inside an annotation such as `tuple[Body, ...] | None`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for inner in getattr(annotation, "__args__", ()):
-        if (found := _model_in(inner)) is not None:
-            return found
-    return None

@@ -43,7 +43,12 @@ class Measured(Model):
             return table
         layer = table.get("layer")
         unit = unit_of(key_of(table["quantity"], layer not in (None, "")))
-        return table | {key: in_si(table[key], unit) for key in ("value", "uncertainty") if key in table}
+        given = {key: table[key] for key in ("value", "uncertainty") if key in table}
+        try:
+            return table | {key: in_si(value, unit) for key, value in given.items()}
+        except ValueError as error:
+            share = f"; {table['quantity']} is a share, such as 0.32 or 32 %" if not unit else ""
+            raise ValueError(f"{error}{share}") from None
 
     @model_validator(mode="after")
     def _known(self) -> Measured:

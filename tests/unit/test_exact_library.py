@@ -5,6 +5,7 @@ import pytest
 from fluidbench.errors import UserError, quoted, suggestion
 from fluidbench.scenario import library
 from fluidbench.scenario.library import assign, find, load, parse_override
+from fluidbench.scenario.mistakes import short
 
 
 def test_a_file_is_found_by_name_or_path(tmp_path, monkeypatch):
@@ -113,6 +114,54 @@ def test_keys_reach_into_tables_and_lists():
     assign({}, ".".join("k" * 33), 1)
 
 
+def test_a_key_of_a_list_that_is_not_there_begins_it():
+    table = {"a": 1}
+    assign(table, "bodies.0.kind", "box")
+    assign(table, "bodies.0.size", [1, 1, 1])
+    assert table["bodies"] == [{"kind": "box", "size": [1, 1, 1]}]
+    with pytest.raises(UserError, match="must be a number below 1"):
+        assign(table, "bodies.1.kind", "box")
+    added = ["bodies.0.kind=box", "bodies.0.size=[0.01, 0.01, 0.01]", "bodies.0.center=[0, 0, 0.02]"]
+    assert load("line_bead", added).bodies[0].size == (0.01, 0.01, 0.01)
+
+
+WALL = "input should be 'slip', 'stick' or 'periodic', or a table with friction"
+
+
+@pytest.mark.parametrize(
+    ("override", "lines"),
+    [
+        ("material=3", ["material: a table [material] is wanted (got 3)"]),
+        ("material.cure=3", ["material.cure: a table [material.cure] is wanted (got 3)"]),
+        ("numerics.mpm=3", ["numerics.mpm: a table [numerics.mpm] is wanted (got 3)"]),
+        ("bodies={x = 1}", ["bodies: a list of tables [[bodies]] is wanted (got {'x': 1})"]),
+        ("measured=[3]", ["measured.0: a table is wanted (got 3)"]),
+        ("gravity=3", ["gravity: a list of 3 numbers is wanted (got 3)"]),
+        ("gravity=[1, 2]", ["gravity: a list of 3 numbers is wanted (got [1, 2])"]),
+        ("toolpath.start=[1, 2, 3]", ["toolpath.start: a list of 2 numbers is wanted (got [1, 2, 3])"]),
+        ("toolpath.points=3", ["toolpath.points: a list is wanted (got 3)"]),
+        ("body_force_gradient=3", ["body_force_gradient: a list of 3 values is wanted (got 3)"]),
+        ("domain.walls.z_lower=3", [f"domain.walls.z_lower: {WALL} (got 3)"]),
+        (
+            "domain.walls.z_lower={frction = 1}",
+            [
+                "'domain.walls.z_lower.friction' is missing",
+                "unknown key 'domain.walls.z_lower.frction'; did you mean 'friction'?",
+            ],
+        ),
+        (
+            "domain.walls.z_lower={Friction = 1, friction = 1}",
+            ["unknown key 'domain.walls.z_lower.Friction'; did you mean 'friction'?"],
+        ),
+        ("until=3", ["until: input should be 'duration' or 'rest' (got 3)"]),
+    ],
+)
+def test_mistakes_are_told_in_keys_and_tables(override, lines):
+    with pytest.raises(UserError) as error:
+        load("line_bead", [override])
+    assert [line.split(" with --set: ")[1] for line in str(error.value).splitlines()] == lines
+
+
 def test_mistakes_are_told_five_at_a_time():
     with pytest.raises(UserError) as error:
         library.validate({f"wrong{i}": 1 for i in range(4)}, "here")
@@ -123,7 +172,7 @@ def test_mistakes_are_told_five_at_a_time():
         "here: 'domain' is missing",
         "here: unknown key 'wrong'; known: " + ", ".join(sorted(library.Scenario.model_fields)),
     ]
-    assert library._short("x" * 450) == "x" * 450 and library._short("x" * 451) == "x" * 450 + "..."
+    assert short("x" * 450) == "x" * 450 and short("x" * 451) == "x" * 450 + "..."
 
 
 def test_words_are_quoted_and_suggested():

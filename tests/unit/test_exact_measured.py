@@ -59,6 +59,10 @@ def test_rows_with_units_layers_and_places(tmp_path):
             "line 3: quantity: no measure of a run is called 'widht'; did you mean 'width'",
         ),
         ("quantity,value\nwidth,2 Pa\n", "line 2: '2 Pa' is of another kind than m"),
+        (
+            "quantity,value\nslump,16 mm\n",
+            "line 2: '16 mm' is of another kind than a plain number; slump is a share",
+        ),
         ("quantity,value\nwidth,wide\n", "line 2: value: input should be a valid number"),
         ("quantity,value,uncertainty\nwidth,1,0\n", "line 2: uncertainty: input should be greater than 0"),
         ("quantity,value,layer\nslump,1,2\n", "no measure of a layer is called 'slump'"),

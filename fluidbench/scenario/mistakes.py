@@ -1,0 +1,115 @@
+"""Mistakes in a scenario in words that its writer uses: keys and tables, instead of classes and tuples."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Sequence
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from ..errors import quoted, suggestion
+from .scenario import Scenario
+
+INNER = ("literal[", "function-", "tagged")  # with what pydantic marks its own steps in a path
+
+
+def told(found: Sequence[Any]) -> list[str]:
+    """Pydantic's errors of a Scenario, each as a line with the key and what would be right."""
+    lines = []
+    for item in found:
+        path, instead = _path(item["loc"])
+        unmeant = "literal_error" if isinstance(item["input"], dict) else "model_type"
+        if instead is None or item["type"] != unmeant:  # of a word or a table, what was given is said to be wrong
+            lines.append(_line(item, path, instead))
+    return lines
+
+
+def short(error: object) -> str:
+    """What an error says, on one line of bearable length."""
+    text = " ".join(str(error).split())
+    return text if len(text) <= 450 else f"{text[:450]}..."
+
+
+def _line(item: Any, path: list[str], instead: type[BaseModel] | None) -> str:
+    """One error; `instead`: the model of a table that may stand there instead of a word."""
+    key = quoted(".".join(path))[1:-1] or "scenario"
+    if item["type"] == "extra_forbidden":
+        return f"unknown key '{key}'{suggestion(path[-1], _walk(path[:-1])[1].model_fields)}"
+    if item["type"] == "missing" and path[-1].isdigit():
+        return f"{quoted('.'.join(path[:-1]))[1:-1]}: {_list_at(path[:-1])} is wanted (got {quoted(item['input'])})"
+    if item["type"] == "missing":
+        return f"'{key}' is missing"
+    message = _wanted(item, path) or short(item["msg"]).removeprefix("Value error, ")
+    if instead is not None:
+        message += f", or a table with {', '.join(instead.model_fields)}"
+    got = "" if item["type"] == "value_error" else f" (got {quoted(item['input'])})"
+    return f"{key}: {message[0].lower()}{message[1:]}{got}"
+
+
+def _wanted(item: Any, path: list[str]) -> str | None:
+    """What is wanted where pydantic would name classes of Python."""
+    if item["type"] in ("model_type", "dict_type"):
+        named = f" [{'.'.join(path)}]" if path and not any(part.isdigit() for part in path) else ""
+        return f"a table{named} is wanted"
+    if item["type"] in ("tuple_type", "list_type", "too_long"):
+        return f"{_list_at(path)} is wanted"
+    return None
+
+
+def _list_at(path: list[str]) -> str:
+    """What a list at a path holds."""
+    annotation, _ = _walk(path)
+    if _model_in(annotation) is not None:
+        return f"a list of tables [[{'.'.join(path)}]]"
+    parts = get_args(annotation)
+    if not parts or parts[-1] is Ellipsis:
+        return "a list"
+    return f"a list of {len(parts)} {'numbers' if set(parts) == {float} else 'values'}"
+
+
+def _walk(path: Sequence[str]) -> tuple[Any, type[BaseModel]]:
+    """What a key or an element of a list is annotated with; and the model of the tables there, or around it."""
+    annotation: Any = None
+    model: type[BaseModel] = Scenario
+    for part in path:
+        if part.isdigit():
+            annotation = next(iter(get_args(annotation)), None)
+        else:
+            field = model.model_fields.get(part)
+            annotation = None if field is None else _without_none(field.annotation)
+        model = _model_in(annotation) or model
+    return annotation, model
+
+
+def _without_none(annotation: Any) -> Any:
+    """`X` of `X | None`."""
+    kept = [part for part in get_args(annotation) if part is not type(None)]
+    return kept[0] if _is_union(annotation) and len(kept) == 1 else annotation
+
+
+def _is_union(annotation: Any) -> bool:
+    return get_origin(annotation) in (Union, types.UnionType)
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The first model inside an annotation such as `tuple[Body, ...] | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for inner in get_args(annotation) if (found := _model_in(inner)) is not None), None)
+
+
+def _path(loc: Sequence[Any]) -> tuple[list[str], type[BaseModel] | None]:
+    """The keys of an error's place; and the model of a table that may stand there instead of a word, which pydantic
+    names as if it were a key."""
+    path: list[str] = []
+    instead = tag = None
+    for part in map(str, loc):
+        if part == tag:
+            tag = None
+        elif not part.startswith(INNER):
+            path.append(part)
+            annotation, _ = _walk(path)
+            instead = _model_in(annotation) if _is_union(annotation) else None
+            tag = None if instead is None else instead.__name__
+    return path, instead
