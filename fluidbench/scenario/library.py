@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import UserError, quoted, suggestion
-from .mistakes import short, told
-from .numerics import check_numerics
+from .mistakes import short, told, unknown_key
+from .numerics import check_numerics, check_sections
 from .scenario import Scenario
 from .units import in_si
 
@@ -71,7 +71,8 @@ def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = N
     """Read a scenario and apply overrides such as {"material.yield_stress": 50} or ["material.yield_stress=50"].
 
     `reference` is the name of a shipped scenario, or a TOML file; the values of `overrides` are in SI units, and None
-    takes a key out. `quick` merges the file's own [quick] table first; a file without one gets a third more spacing.
+    takes a key out. `quick` merges the file's own [quick] table first, whose keys are checked in any case; a file
+    without one gets a third more spacing.
 
     Raises UserError naming the file and key of whatever is wrong.
     """
@@ -81,6 +82,8 @@ def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = N
     shorter = table.pop("quick", None)
     if not isinstance(shorter, dict | None):
         raise UserError(f"{path}: quick: a table is wanted (got {quoted(shorter)})")
+    if shorter is not None:
+        _check_keys(shorter, path)
     if quick:
         table = _merge(table, shorter) if shorter is not None else _coarser(table)
     if isinstance(overrides, str | list | tuple):
@@ -90,6 +93,17 @@ def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = N
     for key, value in (overrides or {}).items():
         assign(table, key, value)
     return validate(table, f"{path} with --set" if overrides else str(path))
+
+
+def _check_keys(shorter: dict[str, Any], path: Path) -> None:
+    """Raise UserError for a key of [quick] that no scenario has, or no method in its section of numerics."""
+    if unknown := unknown_key(shorter):
+        raise UserError(f"{path}: quick: {unknown}")
+    sections = shorter.get("numerics")
+    try:
+        check_sections(sections if isinstance(sections, dict) else {})
+    except UserError as error:
+        raise UserError(f"{path}: quick: {error}") from None
 
 
 def _coarser(table: dict[str, Any]) -> dict[str, Any]:

@@ -25,6 +25,20 @@ def told(found: Sequence[Any]) -> list[str]:
     return lines
 
 
+def unknown_key(table: dict[str, Any], model: type[BaseModel] = Scenario, above: tuple[str, ...] = ()) -> str | None:
+    """What is said of the first key that no scenario has, in a table of some of its keys; None where there is none. The
+    sections of `numerics` are left to their methods."""
+    for key, value in table.items():
+        if key not in model.model_fields:
+            return f"unknown key '{quoted('.'.join([*above, key]))[1:-1]}'{suggestion(key, model.model_fields)}"
+        inner, place = _model_in(model.model_fields[key].annotation), (*above, key)
+        inside = {(*place, str(i)): part for i, part in enumerate(value)} if isinstance(value, list) else {place: value}
+        for where, part in inside.items():
+            if inner is not None and isinstance(part, dict) and (found := unknown_key(part, inner, where)):
+                return found
+    return None
+
+
 def short(error: object) -> str:
     """What an error says, on one line of bearable length."""
     text = " ".join(str(error).split())

@@ -33,8 +33,22 @@ def configure(method: type[Method], scenario: Scenario) -> Any:
 
 def check_numerics(scenario: Scenario) -> None:
     """Raise UserError for a section of `numerics` that no method reads, or that its method refuses."""
-    names = registered()
     for name in scenario.numerics:
-        if name not in names:
-            raise UserError(f"numerics.{quoted(name)[1:-1]}: no method of that name{suggestion(name, names)}")
-        configure(get_method(name), scenario)
+        configure(_method(name), scenario)
+
+
+def check_sections(sections: dict[str, Any]) -> None:
+    """Raise UserError for a section that no method reads, or a key in it that its method does not know."""
+    for name, section in sections.items():
+        known = _method(name).Config.model_fields
+        for key in section if isinstance(section, dict) else ():
+            if key not in known:
+                raise UserError(f"numerics.{name}: unknown key {quoted(key)}{suggestion(key, known)}")
+
+
+def _method(name: str) -> type[Method]:
+    """The method that reads a section of `numerics`; raises UserError for one that there is not."""
+    names = registered()
+    if name not in names:
+        raise UserError(f"numerics.{quoted(name)[1:-1]}: no method of that name{suggestion(name, names)}")
+    return get_method(name)

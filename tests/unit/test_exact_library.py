@@ -1,5 +1,7 @@
 """Scenario files and overrides: what is found, merged and assigned, and which mistakes are told."""
 
+import re
+
 import pytest
 
 from fluidbench.errors import UserError, quoted, suggestion
@@ -67,6 +69,25 @@ def test_quick_takes_the_files_own_table_or_a_third_more_spacing(tmp_path):
     (tmp_path / "bad.toml").write_text("quick = 3\n" + text)
     with pytest.raises(UserError, match="quick: a table is wanted"):
         load(tmp_path / "bad.toml")
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("[quick]\nduratoin = 1.5", "quick: unknown key 'duratoin'; did you mean 'duration'?"),
+        ("[quick]\nextends = 'wall'", "quick: unknown key 'extends'"),
+        ("[quick.toolpath]\nlayrs = 2", "quick: unknown key 'toolpath.layrs'; did you mean 'layers'?"),
+        ("[quick.domain.walls]\nz_lower = { frction = 1 }", "quick: unknown key 'domain.walls.z_lower.frction'"),
+        ("[[quick.bodies]]\nkind = 'box'\n[[quick.bodies]]\nsiz = 3", "quick: unknown key 'bodies.1.siz'"),
+        ("[quick.numerics.mpn]\ngrid_ratio = 2", "quick: numerics.mpn: no method of that name"),
+        ("[quick.numerics.mpm]\ngrid_rato = 2", "quick: numerics.mpm: unknown key 'grid_rato'; did you mean"),
+    ],
+)
+def test_a_key_of_quick_that_is_none_is_refused_whether_it_is_asked_for_or_not(tmp_path, table, words):
+    (tmp_path / "mine.toml").write_text('extends = "line_bead"\n' + table)
+    for quick in (False, True):
+        with pytest.raises(UserError, match=re.escape(f"mine.toml: {words}")):
+            load(tmp_path / "mine.toml", quick=quick)
 
 
 def test_overrides_are_toml_or_words():
