@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from typing import Any
 
@@ -14,7 +15,13 @@ AROUND = (0.0, 0.8, -0.8, 2.4, -2.4, 1.57, -1.57, 3.14)  # and where about it [r
 
 def figure_of(width: float, height: float) -> Any:
     """An empty figure of this size [inches]."""
-    from matplotlib.figure import Figure
+    log = logging.getLogger("matplotlib")
+    before = log.level
+    log.setLevel(logging.ERROR)  # that it keeps its list of fonts in a temporary folder changes no picture
+    try:
+        from matplotlib.figure import Figure
+    finally:
+        log.setLevel(before)
 
     return Figure(figsize=(width, height), layout="constrained")
 

@@ -7,6 +7,7 @@ interface of concurrent.futures that reaches the same folders (dask, submitit).
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Future, ThreadPoolExecutor, as_completed
@@ -18,6 +19,7 @@ from typing import Any
 
 from ..errors import Interrupted, Obstacle, UserError
 from ..files import remove_quietly
+from ..native.device import kernels
 from .checkpoint import CHECKPOINT
 from .interpreter import ALONE, Seat
 from .process import launch, stop_children
@@ -26,6 +28,8 @@ from .store import Store, claimed
 from .work import Report, Work, canonical
 
 POLL = 0.1  # seconds between looks at futures that are not of the standard library
+_told: set[str] = set()  # what is said once in a process, whichever thread comes first
+_telling = threading.Lock()
 
 
 def tell(text: str) -> None:
@@ -73,7 +77,18 @@ def obtain(
         if not reuse:
             remove_quietly(folder / CHECKPOINT)
         made = work.forestall(folder)
-        return Obtained(launch(work, folder, progress, seat) if made is None else made, False, why)
+        if made is None:
+            _tell_of_kernels(note)
+            made = launch(work, folder, progress, seat)
+        return Obtained(made, False, why)
+
+
+def _tell_of_kernels(note: Callable[[str], None]) -> None:
+    """Say where compiled kernels go where that is not the cache folder, once in a process."""
+    with _telling:
+        if (text := kernels().note) and text not in _told:
+            _told.add(text)
+            note(text)
 
 
 def execute(

@@ -7,6 +7,8 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..native.device import kernels
+
 NOISE = (
     "PYTHONPATH",
     "PYTHONSTARTUP",
@@ -40,8 +42,10 @@ AT_A_TIME = "FLUIDBENCH_AT_A_TIME"  # tells a child how many may run beside it, 
 
 def environment(seat: Seat = ALONE) -> dict[str, str]:
     """The environment of a child: never the current folder on its path (PYTHONSAFEPATH), nothing of NOISE, numpy's
-    products on one thread unless told (others spin for cores that are timed), and its seat."""
+    products on one thread unless told (others spin for cores that are timed), a folder for compiled kernels, and its
+    seat. Raises Obstacle where there is no such folder."""
     kept = {k: v for k, v in os.environ.items() if k not in NOISE} | {"PYTHONSAFEPATH": "1", AT_A_TIME: str(seat.of)}
+    kept |= kernels().variables
     if not {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"} & set(kept):
         kept["OPENBLAS_NUM_THREADS"] = "1"
     return kept | ({"CUDA_VISIBLE_DEVICES": seat.gpu} if seat.gpu else {})

@@ -6,6 +6,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from ..errors import Obstacle
 from ..registry import get_method
 from ..report.table import Table, number
 from ..scenario import Scenario
@@ -105,11 +106,14 @@ def diagnosis() -> list[str]:
 def _devices() -> list[str]:
     import warp as wp
 
-    from ..native.device import quiet_warp
+    from ..native.device import kernels, quiet_warp
 
-    quiet_warp()
+    try:
+        quiet_warp()
+    except Obstacle as error:
+        return [f"kernels: {error}"]
     wp.init()
-    lines = ["device cpu: available"]
+    lines = [f"kernels: {kernels().note or f'compiled into {kernels().folder}'}", "device cpu: available"]
     for device in wp.get_cuda_devices():
         lines.append(f"device {device.alias}: {device.name}, {device.total_memory / 2**30:.1f} GiB, sm_{device.arch}")
     if not wp.get_cuda_devices():

@@ -1,16 +1,21 @@
-"""What a child leaves, and what it cost."""
+"""What a child leaves, what it cost, and where its kernels are compiled into."""
 
+import os
 import sys
+import tempfile
 import threading
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import warp as wp
 
 from fluidbench.errors import Interrupted, Obstacle
-from fluidbench.runs import child, process, provenance
+from fluidbench.native import device
+from fluidbench.runs import child, execute, interpreter, process, provenance
 from fluidbench.runs.job import Job
 from fluidbench.runs.record import Record, keep, recall
+from fluidbench.study.preview import diagnosis
 
 from .made import BEAD
 
@@ -185,3 +190,58 @@ def test_peak_memory_is_in_bytes(monkeypatch):
     assert child.peak_memory() == 5 * 1024.0
     monkeypatch.setattr(sys, "platform", "darwin")
     assert child.peak_memory() == 5.0
+
+
+@pytest.fixture
+def homeless(tmp_path, monkeypatch):
+    """A user whose home takes no folder, and whose temporary folder is empty."""
+    wp.init()  # by then Warp has its own folder, which these tests leave to it
+    for name in (device.CACHE, device.TAICHI_CACHE, "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", "/dev/null")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(execute, "_told", set())
+    monkeypatch.setattr("warp.config.kernel_cache_dir", None)
+    device.kernels.cache_clear()
+    yield tmp_path / f"fluidbench-kernels-{os.getuid()}"
+    device.kernels.cache_clear()
+
+
+def test_without_a_cache_folder_kernels_go_to_a_temporary_one_and_that_is_said_once(homeless, monkeypatch):
+    found = device.kernels()
+    assert found.folder == homeless and homeless.stat().st_mode & 0o777 == 0o700
+    assert device.CACHE in found.note and "XDG_CACHE_HOME" in found.note and "/dev/null/.cache/warp" in found.note
+    given = interpreter.environment()
+    assert given[device.CACHE] == str(homeless) and given[device.TAICHI_CACHE] == str(homeless / "taichi")
+    said: list[str] = []
+    for _ in range(2):
+        execute._tell_of_kernels(said.append)
+    assert said == [found.note] and f"kernels: {found.note}" in diagnosis()
+    for name, value in given.items():  # a child finds it, and has nothing to say
+        monkeypatch.setenv(name, value)
+    device.kernels.cache_clear()
+    assert device.kernels() == device.Kernels(homeless, {})
+
+
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", device.CACHE])
+def test_a_variable_names_the_folder_of_kernels(homeless, tmp_path, monkeypatch, variable):
+    monkeypatch.setenv(variable, str(tmp_path / "mine"))
+    found = device.kernels()
+    assert found.folder in (tmp_path / "mine", tmp_path / "mine" / "warp") and not found.note
+    assert device.CACHE not in interpreter.environment() or variable == device.CACHE
+    assert not homeless.exists() and f"kernels: compiled into {found.folder}" in diagnosis()
+
+
+@pytest.mark.parametrize("trap", ["file", "open to all", "link"])
+def test_a_temporary_folder_that_others_can_write_to_takes_no_kernels(homeless, tmp_path, trap):
+    (tmp_path / "other").mkdir()
+    if trap == "link":
+        homeless.symlink_to(tmp_path / "other")
+    elif trap == "file":
+        homeless.write_text("")
+    else:
+        homeless.mkdir()
+        homeless.chmod(0o777)
+    with pytest.raises(Obstacle, match=r"no folder for compiled kernels.*set WARP_CACHE_PATH or XDG_CACHE_HOME"):
+        device.kernels()
+    assert diagnosis()[-1].startswith("kernels: no folder for compiled kernels")
