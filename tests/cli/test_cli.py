@@ -2,10 +2,12 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -165,6 +167,31 @@ def test_list_show_and_doctor_answer():
     shown = fluidbench("show", "dam_break").stdout
     assert "wave speed" in shown and "acoustic" in shown and "substeps" in shown
     assert "warp-lang" in fluidbench("doctor").stdout
+
+
+def test_what_a_terminal_cannot_show_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    done = fluidbench("run", "line_bead", *TINY, "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert "bead area [mm?]" in done.stdout and done.stdout.isascii() and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        ("show line_bead >&-", 0, ""),
+        ("show line_bead >/dev/full", 1, "fluidbench: cannot print to standard output: No space left on device\n"),
+        (">/dev/full", 1, "fluidbench: cannot print to standard output: No space left on device\n"),
+        ("run nope >&- 2>&-", 2, ""),
+        ("list >/dev/full 2>&1", 1, ""),
+        ("init x.toml <&- >&-", 2, "fluidbench: question 1 was not answered; --defaults asks none\n"),
+    ],
+)
+def test_streams_that_are_closed_or_full_are_no_tracebacks(words, code, says, tmp_path):
+    command = f"{shlex.quote(sys.executable)} -m fluidbench {words}"
+    env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    done = subprocess.run(command, shell=True, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (code, says)
 
 
 def test_validate_writes_its_table_and_page_and_resumes(tmp_path):
