@@ -14,9 +14,20 @@ class Obstacle(Exception):
     """Something outside the program stopped it, such as a full disk; one line, exit code 1. What was finished stays."""
 
 
+class Halted(Obstacle):
+    """An obstacle that was met while runs were under way, or when they had ended: what of them is finished stays, and
+    the same command resumes with the rest."""
+
+
 class Interrupted(BaseException):
     """The user, or the system, wants it to stop; the message says what is finished. No KeyboardInterrupt, which the
     parser of the command line would swallow."""
+
+
+def of_system(error: OSError) -> str:
+    """What the system would not do, and with which file, where it says so."""
+    name = f": {quoted(str(error.filename))[1:-1]}" if error.filename else ""
+    return f"{error.strerror or error}{name}"
 
 
 def quoted(value: object) -> str:

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import typer
 
-from ..errors import Interrupted, Obstacle, UserError, quoted
+from ..errors import Halted, Interrupted, Obstacle, UserError, of_system
 from . import engines, info, pictures, runs, start, streams, studies
 from .app import app
 
@@ -28,7 +28,8 @@ def main() -> None:
     except UserError as error:
         _leave(2, *str(error).splitlines()[:MOST_LINES])
     except Obstacle as error:
-        _leave(1, f"{error}; what is finished stays, the same command resumes")
+        resumes = "; what is finished stays, the same command resumes" if isinstance(error, Halted) else ""
+        _leave(1, f"{error}{resumes}")
     except (KeyboardInterrupt, Interrupted) as error:
         _leave(
             130, f"interrupted: {str(error) or 'nothing is lost'}; the same command resumes with what is not finished"
@@ -39,8 +40,7 @@ def main() -> None:
     except OSError as error:
         if why := streams.unprintable(error):
             _leave(1, f"cannot print to standard output: {why}")
-        where = f": {quoted(str(error.filename))[1:-1]}" if error.filename else ""
-        _leave(1, f"{error.strerror or error}{where}; what is finished stays, the same command resumes")
+        _leave(1, of_system(error))
 
 
 def _called() -> int:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from ..errors import Halted, Obstacle
+
 if TYPE_CHECKING:
     from ..study.result import Result
 
@@ -24,7 +26,10 @@ def finish(result: Result, width: int | None = 120) -> None:
     with 1 where it does not say what it was asked for."""
     from rich.console import Console
 
-    page = result.save()
+    try:
+        page = result.save()
+    except Obstacle as error:
+        raise (Halted(str(error)) if result.runs and not result.kept else error) from None
     console = Console(width=None if sys.stdout.isatty() else width)
     result.show(console)
     console.print(f"report: {page}", markup=False, highlight=False, soft_wrap=True)

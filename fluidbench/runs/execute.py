@@ -17,7 +17,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from ..errors import Interrupted, Obstacle, UserError
+from ..errors import Halted, Interrupted, Obstacle, UserError, of_system
 from ..files import remove_quietly
 from ..native.device import kernels
 from .checkpoint import CHECKPOINT
@@ -71,20 +71,20 @@ def obtain(
         result, why = work.recall(folder) if reuse else (None, "")
         if why:
             note(f"{folder.name} is run again: {why}")
+        if result is None:
+            _tell_of_kernels(note)
         begun(result is not None)
         if result is not None:
             return Obtained(result, True)
         if not reuse:
             remove_quietly(folder / CHECKPOINT)
         made = work.forestall(folder)
-        if made is None:
-            _tell_of_kernels(note)
-            made = launch(work, folder, progress, seat)
-        return Obtained(made, False, why)
+        return Obtained(launch(work, folder, progress, seat) if made is None else made, False, why)
 
 
 def _tell_of_kernels(note: Callable[[str], None]) -> None:
-    """Say where compiled kernels go where that is not the cache folder, once in a process."""
+    """Say where compiled kernels go where that is not the cache folder, once in a process; raises Obstacle where they
+    cannot go anywhere."""
     with _telling:
         if (text := kernels().note) and text not in _told:
             _told.add(text)
@@ -103,21 +103,27 @@ def execute(
     at a time, so that timings mean something; with an executor as many as it likes. Where there are several `gpus` (in
     the words of CUDA_VISIBLE_DEVICES), each worker has one of its own.
 
-    Raises Interrupted, which says how much is finished, when the user or the system wants it to stop.
+    Raises Interrupted, which says how much is finished, when the user or the system wants it to stop, and Halted where
+    something stops it when a run has begun or is finished already.
     """
     places: dict[bytes, list[int]] = {}
     for i, work in enumerate(planned):
         places.setdefault(canonical(asdict(work)), []).append(i)
     results: list[Any] = [None] * len(planned)
-    done = 0
+    done, under_way = 0, False
 
     def calls() -> Iterator[tuple[bytes, Callable[..., Obtained]]]:
         for place, (i, *_) in places.items():
             folder = store.folder(planned[i].name, planned[i].inputs())
-            told = {"progress": partial(hooks.progress, i), "begun": partial(hooks.started, i, planned[i])}
+            told = {"progress": partial(hooks.progress, i), "begun": partial(begun, i)}
             here = told | {"note": hooks.note}
             reuse = store.may_reuse(folder)
             yield place, partial(obtain, planned[i], folder, reuse, **({} if executor is not None else here))
+
+    def begun(i: int, reused: bool) -> None:
+        nonlocal under_way
+        under_way = True
+        hooks.started(i, planned[i], reused)
 
     def ended(place: bytes, got: Obtained) -> None:
         nonlocal done
@@ -149,6 +155,10 @@ def execute(
             _gather(as_executor(executor), calls(), ended)
     except (KeyboardInterrupt, Interrupted):
         raise Interrupted(f"{done} of {len(planned)} runs are finished") from None
+    except (Obstacle, OSError) as error:
+        if isinstance(error, BrokenPipeError) or not (under_way or done or store.made):
+            raise
+        raise Halted(of_system(error) if isinstance(error, OSError) else str(error)) from None
     return results
 
 

@@ -182,12 +182,13 @@ def test_what_a_terminal_cannot_show_is_replaced(tmp_path, monkeypatch):
         ("show line_bead >&-", 0, ""),
         ("show line_bead >/dev/full", 1, "fluidbench: cannot print to standard output: No space left on device\n"),
         (">/dev/full", 1, "fluidbench: cannot print to standard output: No space left on device\n"),
+        ("init /proc/x.toml --defaults", 1, "fluidbench: cannot write /proc/x.toml: No such file or directory\n"),
         ("run nope >&- 2>&-", 2, ""),
         ("list >/dev/full 2>&1", 1, ""),
         ("init x.toml <&- >&-", 2, "fluidbench: question 1 was not answered; --defaults asks none\n"),
     ],
 )
-def test_streams_that_are_closed_or_full_are_no_tracebacks(words, code, says, tmp_path):
+def test_what_is_closed_full_or_read_only_is_one_line_that_promises_nothing(words, code, says, tmp_path):
     command = f"{shlex.quote(sys.executable)} -m fluidbench {words}"
     env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
     done = subprocess.run(command, shell=True, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)

@@ -6,7 +6,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from fluidbench.errors import Interrupted, UserError
+from fluidbench.errors import Halted, Interrupted, Obstacle, UserError
 from fluidbench.method.target import HERE, Target
 from fluidbench.report.progress import Display
 from fluidbench.runs import execute as execution
@@ -124,6 +124,32 @@ def test_an_interruption_says_how_much_is_finished(tmp_path, monkeypatch):
     monkeypatch.setattr(execution, "launch", launch)
     with pytest.raises(Interrupted, match="2 of 4 runs are finished"):
         execute([task(x) for x in range(4)], Store(tmp_path), SILENT)
+
+
+@pytest.mark.parametrize("error", [Obstacle("the disk is full"), OSError(12, "Cannot allocate memory")], ids=repr)
+def test_what_is_under_way_resumes_and_what_never_began_does_not(tmp_path, monkeypatch, error):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(execution, "launch", fail)
+    with pytest.raises(Halted, match=r"^(the disk is full|Cannot allocate memory)$"):
+        execute([task(1)], Store(tmp_path), SILENT)
+    monkeypatch.setattr(execution, "kernels", fail)  # no folder for them
+    with pytest.raises(type(error)) as met:
+        execute([task(1)], Store(tmp_path), SILENT)
+    assert not isinstance(met.value, Halted)
+
+
+def test_a_file_in_the_place_of_a_run_halts_what_is_finished_alone(tmp_path, done):
+    store, tasks = Store(tmp_path), [task(1), task(2)]
+    place = store.folder(tasks[1].name, tasks[1].inputs())
+    place.parent.mkdir()
+    place.write_text("mine")
+    with pytest.raises(Halted, match="File exists"):
+        execute(tasks, Store(tmp_path), SILENT)
+    with pytest.raises(Obstacle, match="File exists") as met:
+        execute(tasks[1:], Store(tmp_path), SILENT)
+    assert not isinstance(met.value, Halted) and place.read_text() == "mine" and done == [1]
 
 
 def test_who_kills_a_process_is_found_and_the_others_are_run(tmp_path):

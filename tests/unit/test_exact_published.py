@@ -9,6 +9,7 @@ import pytest
 from typer import Exit
 
 from fluidbench.cli.app import finish
+from fluidbench.errors import Halted, Obstacle
 from fluidbench.report.report import write
 from fluidbench.study import trials
 from fluidbench.study import validate_report as page
@@ -149,6 +150,16 @@ def test_a_validation_writes_everything_and_tells_notes(tmp_path, capsys):
     assert html.count("<h2 id=") == 2 + 1 and html.count('<h2 id="table-') == 1 and "error against cost" in html
     assert '<p class="bad">drop sph: timeout: slow' in html
     assert len(list(tmp_path.glob("*work_precision.png"))) == 1  # of the case, not of the law
+
+
+@pytest.mark.parametrize(("runs", "kept", "kind"), [([1], False, Halted), ([1], True, Obstacle), ([], False, Obstacle)])
+def test_a_report_that_cannot_be_written_leaves_runs_that_can_be_used_again(runs, kept, kind):
+    def full():
+        raise Obstacle("cannot write report.html: No space left on device")
+
+    with pytest.raises(Obstacle, match="No space left") as met:
+        finish(SimpleNamespace(save=full, runs=runs, kept=kept))
+    assert type(met.value) is kind
 
 
 def test_a_validation_of_which_nothing_missed_leaves_without_a_word(tmp_path, capsys):
