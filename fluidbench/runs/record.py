@@ -110,6 +110,11 @@ class Record(BaseModel):
         return int(self.machine.get("runs_at_a_time", "1"))
 
     @property
+    def counted(self) -> Cost | None:
+        """Its cost where that counts, as studies tell it: none where the run has no result, whatever it took."""
+        return self.cost if evidence_of(self.verdict) is Evidence.RESULT else None
+
+    @property
     def seconds(self) -> float:
         """What its loop took [s]: CPU time on one core, which other work on the machine leaves as it is; wall time on
         several and on a GPU. NaN where it was not run."""
@@ -123,7 +128,7 @@ class Record(BaseModel):
         row |= {"verdict": str(self.verdict), "reason": self.reason}
         row |= {"print": str(self.print or "")} | self.measures
         row |= {f"error: {a.quantity}": a.error for a in self.answers}
-        row |= self.cost.model_dump(exclude_none=True) if self.cost else {}
+        row |= self.counted.model_dump(exclude_none=True) if self.counted else {}
         return row | {"binding_bound": self.binding} | {f"machine_{k}": v for k, v in self.machine.items()}
 
 

@@ -91,7 +91,7 @@ def failed_prints(results: Sequence[Run]) -> list[str]:
 def costs(results: Sequence[Run]) -> Table:
     """What it cost, compilation apart."""
     sound = {n: [r for r in g if evidence_of(r.verdict) is Evidence.RESULT] for n, g in by_method(results).items()}
-    groups = {n: [r.cost for r in g if r.cost is not None] for n, g in sound.items()}
+    groups = {n: [r.counted for r in g if r.counted is not None] for n, g in sound.items()}
     table = Table("Cost (without compilation)", ["", *groups])
     for key in (
         "wall_s",

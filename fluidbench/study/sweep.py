@@ -184,4 +184,4 @@ def run_alone(points: Sequence[Point], place: Workplace) -> None:
         point.verdict, point.reason, point.run = run.verdict, run.reason, run
         point.measures = run.record.measures
         point.print, point.warnings = run.record.print or "", list(run.record.warnings)
-        point.cost = run.record.cost.model_dump(exclude_none=True) if run.record.cost is not None else {}
+        point.cost = run.record.counted.model_dump(exclude_none=True) if run.record.counted is not None else {}

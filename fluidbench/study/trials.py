@@ -157,22 +157,22 @@ def run(trials: Sequence[Trial], place: Workplace, title: str = "known answers",
 
 
 def evaluate(trial: Trial) -> None:
-    """Judge a trial whose runs have all ended."""
+    """Judge a trial whose runs have all ended; where one has no result the trial has no cost, but for its particles."""
     runs = list(trial.runs.values())
     failed = [run for run in runs if not run.ok]
     costs = [run.record.cost for run in runs if run.record.cost is not None]
+    particles = {"particles": max((cost.peak_particles for cost in costs), default=0)}
+    if failed:
+        first = min(failed, key=lambda run: run.evidence is Evidence.INSTABILITY)
+        trial.verdict, trial.note, trial.cost = first.verdict, first.reason, particles
+        return
     simulated = sum(cost.simulated_s for cost in costs)
-    trial.cost = {
-        "particles": max((cost.peak_particles for cost in costs), default=0),
+    trial.cost = particles | {
         "substeps": sum(cost.substeps for cost in costs),
         "wall_s": sum(cost.wall_s for cost in costs),
         "cpu_s": sum(cost.cpu_s for cost in costs),
         "wall_per_simulated_s": sum(cost.wall_s for cost in costs) / simulated if simulated else math.nan,
     }
-    if failed:
-        first = min(failed, key=lambda run: run.evidence is Evidence.INSTABILITY)
-        trial.verdict, trial.note = first.verdict, first.reason
-        return
     judge(trial, lambda case: case.evaluate({label: trial.runs[label] for label in trial.jobs}))
 
 

@@ -27,7 +27,7 @@ from fluidbench.runs.record import Cost, Record, Run, keep, recall
 from fluidbench.runs.store import Store, read_record, seal, write_record
 from fluidbench.runs.work import key_of
 
-from .made import BEAD, COST, HEADING, SILENT, finished
+from .made import BEAD, COST, HEADING, SILENT, change, finished
 
 TABLE = BEAD.model_dump(mode="json")
 
@@ -370,6 +370,14 @@ def test_a_run_without_a_result_has_no_cost():
     with pytest.raises(ValueError, match="line_bead, mpm, d = 1 mm: timeout: it has no cost"):
         finished(verdict="timeout").cost  # noqa: B018
     assert finished(verdict="timeout").record.row()["verdict"] == "timeout"
+
+
+@pytest.mark.parametrize("verdict", [v for v in Verdict if v is not Verdict.COMPLETED])
+def test_what_a_run_without_a_result_took_is_kept_and_told_nowhere(verdict):
+    whole = finished()
+    taken = change(finished(), verdict=verdict).record
+    assert taken.cost == whole.cost == whole.record.counted and taken.counted is None
+    assert set(whole.record.row()) - set(taken.row()) == set(whole.cost.model_dump(exclude_none=True))
 
 
 # --- where work is done

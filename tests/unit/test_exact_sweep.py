@@ -14,7 +14,7 @@ from fluidbench.study.sweep import Point, points_of
 from fluidbench.study.sweep_report import report
 from fluidbench.study.worlds import shared
 
-from .made import BEAD, finished, working
+from .made import BEAD, change, finished, working
 
 STRESS, SPEED = "material.yield_stress", "nozzle.exit_speed"
 MPM = get_method("mpm")
@@ -201,13 +201,16 @@ def test_on_a_processor_nothing_is_shared_unless_asked(monkeypatch, tmp_path):
 def test_a_point_that_blew_up_is_a_point(monkeypatch, tmp_path):
     def answer(work):
         bad = work.scenario["material"]["yield_stress"] > 50.0
-        return finished(work.method, "diverged" if bad else "completed", reason="it flew" if bad else "")
+        told = {"verdict": "diverged", "reason": "it flew"} if bad else {}
+        return change(finished(work.method, wall_s=3.0), **told)
 
     working(monkeypatch, answer)
     found = fb.sweep("line_bead", {STRESS: [20.0, 60.0]}, ["mpm"], out=tmp_path, progress=False)
     assert found.table.verdict.tolist() == ["completed", "diverged"] and found.ok
     assert found.report.failures == ["mpm, material.yield_stress = 60.0: diverged: it flew"]
     assert found.findings[0] == "2 points, 2 runs: 1 completed, 1 diverged."
+    assert found.runs[1].cost.wall_s == 3.0 and found.table.wall_s.isna().tolist() == [False, True]
+    assert [row[-1] for row in found.report.tables[0].rows] == ["3", "-"]  # it took time, and has no cost
 
 
 def test_lengths_are_small_multiples_over_the_first_key(tmp_path):
