@@ -132,4 +132,4 @@ def validate(
     if cases:
         names_in(",".join(cases), "CASES", "case")
     more, spacings = placed(options, "validate"), names_in(levels, "--levels", "level")
-    finish(study(cases, methods_in(solvers), levels=spacings, quick=quick, seed=seed, **more))
+    finish(study(cases or None, methods_in(solvers), levels=spacings, quick=quick, seed=seed, **more))

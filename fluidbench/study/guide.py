@@ -95,8 +95,11 @@ def published(folder: str | Path, tolerances: Sequence[float] = TOLERANCES, out:
 
 
 def subjects_of(scenarios: Sequence[Scenario | str | Path] | None, quick: bool) -> dict[str, Scenario]:
-    """Scenario by job; raises UserError for one that is named twice."""
-    given: Iterable[Any] = names_of(scenarios, "scenario") or JOBS.values()
+    """Scenario by job; raises UserError for one that is named twice, and for an empty list."""
+    named = names_of(scenarios, "scenario")
+    if named is not None and not named:
+        raise UserError("scenarios: none is named; leave them out for one of each job")
+    given: Iterable[Any] = named or JOBS.values()
     titles = {name: job for job, name in JOBS.items()}
     found: dict[str, Scenario] = {}
     for one in given:

@@ -49,6 +49,8 @@ def validate(
     cases, levels = names_of(cases, "cases"), names_of(levels, "levels") or ()
     if not levels:
         raise UserError("levels: none is named")
+    if cases is not None and not cases:
+        raise UserError("cases: none is named; leave them out for all")
     chosen = select(cases or [])
     if cases and quick and (long := [case.name for case in chosen if case.quick is None]):
         raise UserError(f"{', '.join(long)}: too dear to have a quick version; leave quick out")

@@ -185,5 +185,10 @@ def test_tolerances_are_numbers_above_nothing(given, tmp_path):
             call()
 
 
+def test_no_scenario_is_not_every_job(tmp_path):
+    with pytest.raises(UserError, match="scenarios: none is named"):
+        guide([], out=tmp_path)
+
+
 def test_a_tolerance_named_twice_is_one():
     assert tolerances_of([0.05, 0.02, 0.05]) == [0.02, 0.05] and tolerances_of(0.1) == [0.1]

@@ -349,3 +349,6 @@ def test_a_validation_without_a_judged_trial_is_none(tmp_path):
     assert not module.result_of([], workplace_in(tmp_path)).ok
     with pytest.raises(UserError, match="levels: none is named"):
         module.validate([law], ["mpm"], levels=[], out=tmp_path)
+    for nothing in ([], (), iter(())):
+        with pytest.raises(UserError, match="cases: none is named"):
+            module.validate(nothing, ["mpm"], out=tmp_path)
