@@ -229,23 +229,6 @@ def repeats_of(value: int) -> int:
     return value
 
 
-def fraction(text: str) -> float:
-    """'5%' or '0.05' -> 0.05; raises UserError for what is no positive share: a share above 1 needs its percent sign,
-    since 5 would be 500 %."""
-    percent = text.strip().endswith("%")
-    try:
-        value = float(text.strip().removesuffix("%")) / (100.0 if percent else 1.0)
-    except ValueError:
-        value = -1.0
-    if not (1e-6 <= value < 10.0):
-        raise UserError(f"--tolerance takes a share such as 5% or 0.05; got {quoted(text)}")
-    if value > 1.0 and not percent:
-        raise UserError(
-            f"--tolerance {text.strip()} would be {100 * value:g} %; write {text.strip()}% or a share below 1"
-        )
-    return value
-
-
 def count_of(text: str, option: str) -> int:
     """'298000' -> 298000; raises UserError for what is no positive whole number."""
     if not (text.isascii() and text.isdecimal()) or len(text) > 30 or int(text) == 0:

@@ -20,7 +20,6 @@ from .options import (
     axes_of,
     budget_of,
     count_of,
-    fraction,
     limited,
     load_scenario,
     methods_in,
@@ -138,10 +137,10 @@ def ablate(
     """
     from ..study.ablate import ablate as study
 
-    resolved, share = load_scenario(scenario, set_, spacing), fraction(tolerance)
+    resolved = load_scenario(scenario, set_, spacing)
     given = [*(set_ or []), *([f"spacing={spacing!r}"] if spacing is not None else [])]
     more = placed(options, "ablate")
-    finish(study(resolved, methods_in(solvers), tolerance=share, called=scenario, given=given, **more))
+    finish(study(resolved, methods_in(solvers), tolerance=tolerance, called=scenario, given=given, **more))
 
 
 @app.command()
@@ -167,13 +166,13 @@ def select(
     """
     from ..study.select import select as study
 
-    resolved, share = load_scenario(scenario, set_, spacing, quick), fraction(tolerance)
+    resolved = load_scenario(scenario, set_, spacing, quick)
     longest, pace = budget_of(budget)
     more = placed(limited(context, options), f"select-{resolved.name}")
     chosen = study(
         resolved,
         methods_in(solvers),
-        tolerance=share,
+        tolerance=tolerance,
         budget=longest,
         pace=pace,
         within=within_of(within),
@@ -209,7 +208,7 @@ def guide(
     from ..study.guide import guide as study
     from ..study.guide import published
 
-    shares = [fraction(text) for text in names_in(tolerance, "--tolerance", "tolerance")]
+    shares = names_in(tolerance, "--tolerance", "tolerance")
     if from_ is not None:
         alone(context, "from_", "tolerance")
         finish(published(from_, shares, placed(options, "guide-published").get("out")))

@@ -17,7 +17,7 @@ from .candidates import limit_within, run_candidates
 from .guide_report import report
 from .result import Result
 from .selection import Selection, Trust, assess
-from .workplace import Options, Workplace, as_scenario, methods_of, names_of, require_number
+from .workplace import Options, Workplace, as_scenario, methods_of, names_of, share_of
 
 JOBS = {
     "paste bead": "line_bead",
@@ -47,7 +47,7 @@ def guide(
     scenarios: Sequence[Scenario | str | Path] | None = None,
     methods: Sequence[str] | None = None,
     *,
-    tolerances: Sequence[float] = TOLERANCES,
+    tolerances: Sequence[float | str] = TOLERANCES,
     quick: bool = False,
     within: float = math.inf,
     **options: Unpack[Options],
@@ -56,8 +56,8 @@ def guide(
     side by side.
 
     `scenarios`: shipped names, TOML files or scenarios, default those of JOBS; `quick`: the shorter versions of what is
-    named; `methods` are names, default all; `tolerances`: largest relative errors of any length; `within`: time [s]
-    that all of it may take on a CPU, as in `select`. `options` are those of every verb, see Options.
+    named; `methods` are names, default all; `tolerances`: largest relative errors of any length, as 0.05 or "5%";
+    `within`: time [s] that all of it may take on a CPU, as in `select`. `options` are those of every verb, see Options.
 
     Raises UserError for what cannot be run, before anything is; Obstacle where `within` proves too short.
     """
@@ -74,7 +74,9 @@ def guide(
     return _concluded(studies, wanted, place.store.root, keeper=place.keeper)
 
 
-def published(folder: str | Path, tolerances: Sequence[float] = TOLERANCES, out: str | Path | None = None) -> Guide:
+def published(
+    folder: str | Path, tolerances: Sequence[float | str] = TOLERANCES, out: str | Path | None = None
+) -> Guide:
     """Choose again from what studies have kept in a `folder`, or in folders inside it: nothing is run.
 
     Raises UserError where there is none, for one that was changed since, and for studies of different scenarios.
@@ -121,9 +123,8 @@ def _concluded(studies: dict[str, dict[str, Selection]], tolerances: Sequence[fl
 
 def tolerances_of(given: Any) -> list[float]:
     """From the least to the largest; raises UserError for what is none."""
-    found = list(given) if isinstance(given, Iterable) else [given]
-    for one in found:
-        require_number(one, "tolerance", 1e-6)
+    several = isinstance(given, Iterable) and not isinstance(given, str)
+    found = [share_of(one, "tolerances") for one in (given if several else [given])]
     if not found:
         raise UserError("tolerances: at least one is wanted")
     return sorted(set(found))

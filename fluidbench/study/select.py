@@ -14,7 +14,7 @@ from .candidates import limit_within, run_candidates
 from .result import Result
 from .select_report import report
 from .selection import Selection, assess
-from .workplace import Options, Workplace, as_scenario, measured_of, methods_of, require_number
+from .workplace import Options, Workplace, as_scenario, measured_of, methods_of, require_number, share_of
 
 
 @dataclass(repr=False)
@@ -28,7 +28,7 @@ def select(
     scenario: Scenario | str | Path,
     methods: Sequence[str] | None = None,
     *,
-    tolerance: float = 0.05,
+    tolerance: float | str = 0.05,
     budget: float = math.inf,
     pace: float = math.inf,
     within: float = math.inf,
@@ -37,7 +37,7 @@ def select(
     **options: Unpack[Options],
 ) -> Selected:
     """Recommend a method, spacing and time step: least cost within a `tolerance` (largest relative error of any
-    length), within a `budget` of time [s] and a `pace` (s per simulated s), on this machine.
+    length, as 0.05 or "5%"), within a `budget` of time [s] and a `pace` (s per simulated s), on this machine.
 
     Runs every method at four spacings, on a GPU at five. `scenario` is one, a shipped name or a TOML file; `methods`
     are names, default all. `called` is the scenario's name in the command that it recommends. `measured`: a table of
@@ -47,7 +47,7 @@ def select(
 
     Raises UserError for what cannot be run, before anything is; Obstacle where `within` proves too short.
     """
-    require_number(tolerance, "tolerance", 1e-6)
+    share = share_of(tolerance, "tolerance")
     for value, what in ((budget, "budget"), (pace, "pace")):
         require_number(value, what, 0.0, high=math.inf)
     resolved, names = as_scenario(scenario), methods_of(methods, options)
@@ -55,7 +55,7 @@ def select(
     beside = measured_of(resolved, measured)
     (tried,) = run_candidates({resolved.name: resolved}, names, place, "select", within).values()
     found = assess(resolved, names, tried.runs, beside, tried.untried)
-    made = report(resolved, called or resolved.name, found, tolerance, budget, pace, place.store.root)
+    made = report(resolved, called or resolved.name, found, share, budget, pace, place.store.root)
     missing = found.missing()
     ok = bool(found.candidates) and not missing
     return Selected(made, place.store.root, found.runs, missing, ok, place.keeper, found)

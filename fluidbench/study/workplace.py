@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import sys
@@ -179,6 +180,23 @@ def require_number(value: Any, what: str, low: float, whole: bool = False, high:
         kind = "whole number" if whole else "number"
         most = f" and at most {high:.10g}" if high < sys.float_info.max else ""
         raise UserError(f"{what}: a {kind} of at least {low:g}{most} is wanted (got {quoted(value)})")
+
+
+def share_of(given: Any, what: str) -> float:
+    """'5%', '0.05' or 0.05 -> 0.05; raises UserError for what is no positive share below 10. One above 1 needs its
+    percent sign, since 5 would be 500 %."""
+    text = given.strip() if isinstance(given, str) else None
+    percent = text is not None and text.endswith("%")
+    number = given if text is None else text.removesuffix("%")
+    try:
+        value = float(number) / (100.0 if percent else 1.0) if not isinstance(given, bool) else math.nan
+    except (TypeError, ValueError, OverflowError):
+        value = math.nan
+    if not 1e-6 <= value < 10.0:
+        raise UserError(f"{what}: a share such as 5% or 0.05 is wanted (got {quoted(given)})")
+    if value > 1.0 and not percent:
+        raise UserError(f"{what}: {value:g} would be {100 * value:g} %; write '{value:g}%' or a share of at most 1")
+    return value
 
 
 def methods_of(

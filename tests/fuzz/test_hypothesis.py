@@ -10,14 +10,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fluidbench.cli.options import budget_of, count_of, fraction, names_in
+from fluidbench.cli.options import budget_of, count_of, names_in
 from fluidbench.errors import UserError
 from fluidbench.registry import method_names
 from fluidbench.scenario import Scenario
 from fluidbench.scenario.library import assign, load, parse_override, validate
 from fluidbench.study.case import select
 from fluidbench.study.points import choose
-from fluidbench.study.workplace import targets_of
+from fluidbench.study.workplace import share_of, targets_of
 
 from .harness import fluidbench, nothing_runs
 from .leaves import OWN, full, leaves, table
@@ -137,11 +137,15 @@ def test_any_text_of_set_is_an_override_or_a_user_error(text):
             assert str(error)
 
 
+def share(text):
+    return share_of(text, "tolerance")
+
+
 @MANY
 @given(WORDS)
 def test_any_text_of_an_option_is_a_value_or_a_user_error(text):
     for read in (
-        fraction,
+        share,
         budget_of,
         lambda t: count_of(t, "--pools"),
         lambda t: choose(names_in(t, "--axis", "axis"), method_names()),
@@ -153,7 +157,7 @@ def test_any_text_of_an_option_is_a_value_or_a_user_error(text):
         except UserError as error:
             assert str(error)
             continue
-        if read is fraction:
+        if read is share:
             assert isinstance(made, float) and 0 < made < math.inf
         if read is budget_of:
             assert isinstance(made, tuple) and all(value > 0 for value in made)  # infinite: no budget

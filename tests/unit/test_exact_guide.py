@@ -178,8 +178,8 @@ def test_what_was_measured_counts(tmp_path, monkeypatch):
     assert not made.table.met.any() and made.table.error.iloc[0] == pytest.approx(0.5, abs=0.02)
 
 
-@pytest.mark.parametrize("given", [[], [math.nan], [0.0], ["5%"], "5%", None, [0.05, -1.0]])
-def test_tolerances_are_numbers_above_nothing(given, tmp_path):
+@pytest.mark.parametrize("given", [[], [math.nan], [0.0], ["5 mm"], "five", None, [0.05, -1.0], [5]])
+def test_tolerances_are_shares_above_nothing(given, tmp_path):
     for call in (lambda: guide([BEAD], tolerances=given, out=tmp_path), lambda: published(tmp_path, given)):
         with pytest.raises(UserError, match="tolerance"):
             call()
@@ -192,3 +192,4 @@ def test_no_scenario_is_not_every_job(tmp_path):
 
 def test_a_tolerance_named_twice_is_one():
     assert tolerances_of([0.05, 0.02, 0.05]) == [0.02, 0.05] and tolerances_of(0.1) == [0.1]
+    assert tolerances_of("5%") == [0.05] and tolerances_of(["10%", 0.02]) == [0.02, 0.1]

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+import fluidbench as fb
 from fluidbench.cli import options
 from fluidbench.errors import UserError
 from fluidbench.method.target import Target
@@ -27,23 +28,37 @@ YEAR = 3.2e7
         ("1e-6", 1e-6),
         ("1e-4%", 1e-6),
         ("150%", 1.5),
+        (0.05, 0.05),
+        (1, 1.0),
     ],
 )
 def test_shares(text, value):
-    assert options.fraction(text) == pytest.approx(value)
+    assert workplace.share_of(text, "tolerance") == pytest.approx(value)
 
 
-@pytest.mark.parametrize("text", ["1000%", "9.9e-7", "0", "-5%", "nan", "inf", "five", "", "%", "10"])
-def test_what_is_no_share(text):
-    with pytest.raises(UserError, match=r"takes a share such as 5% or 0\.05"):
-        options.fraction(text)
+@pytest.mark.parametrize(
+    "given",
+    ["1000%", "9.9e-7", "0", "-5%", "nan", "inf", "five", "", "%", "10", 0, -0.1, 10.0, math.nan, True, None, [5]],
+)
+def test_what_is_no_share(given):
+    with pytest.raises(UserError, match=r"tolerance: a share such as 5% or 0\.05 is wanted"):
+        workplace.share_of(given, "tolerance")
 
 
-def test_a_share_above_one_needs_its_sign():
-    with pytest.raises(UserError, match=r"--tolerance 5 would be 500 %; write 5% or a share below 1"):
-        options.fraction("5")
+@pytest.mark.parametrize("given", [5, 5.0, "5", " 5.0 "])
+def test_a_share_above_one_needs_its_sign(given, tmp_path):
+    """On the command line and in Python alike."""
+    words = "5 would be 500 %; write '5%' or a share of at most 1"
+    for call in (
+        lambda: workplace.share_of(given, "tolerance"),
+        lambda: fb.select(bead(), tolerance=given, out=tmp_path),
+        lambda: fb.ablate(bead(), tolerance=given, out=tmp_path),
+        lambda: fb.guide([bead()], tolerances=[0.1, given], out=tmp_path),
+    ):
+        with pytest.raises(UserError, match=words):
+            call()
     with pytest.raises(UserError, match=r"would be 101 %"):
-        options.fraction("1.01")
+        workplace.share_of(1.01, "tolerance")
 
 
 @pytest.mark.parametrize(

@@ -358,7 +358,7 @@ def test_a_selection_needs_candidates_and_every_run(tmp_path, monkeypatch, verdi
         return finished(job.method, verdict, {"bead_width_m": 0.01 + d}, spacing=d)
 
     calls = working(monkeypatch, answer)
-    made = select(BEAD, "mpm", tolerance=9.0, out=tmp_path, progress=False)
+    made = select(BEAD, "mpm", tolerance="900%", out=tmp_path, progress=False)
     assert len(made.table) == len(made.found.candidates) == count and bool(made.missing) is lacks
     assert made.ok is (verdict == "completed") and len(made.runs) == 4 and [call.workers for call in calls] == [cores()]
     assert made.findings[1].startswith("Recommended: mpm") if count else made.findings[0].startswith("No recomm")

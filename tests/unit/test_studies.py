@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fluidbench.cli.options import budget_of, fraction
+from fluidbench.cli.options import budget_of
 from fluidbench.errors import UserError
 from fluidbench.method.suitability import approximations, refusal
 from fluidbench.method.target import HERE
@@ -184,12 +184,9 @@ def test_an_effect_names_the_length_that_moved_most():
 
 
 def test_options_are_read_or_refused():
-    assert fraction("5%") == pytest.approx(0.05) and fraction("0.1") == pytest.approx(0.1)
     assert budget_of("60s") == (60.0, math.inf) and budget_of("realtime") == (math.inf, 1.0)
     assert budget_of("2m")[0] == 120.0 and np.isinf(budget_of("")[0])
     for wrong in ("five", "-1"):
-        with pytest.raises(UserError, match="takes a"):
-            fraction(wrong)
         with pytest.raises(UserError, match="takes a"):
             budget_of(wrong)
     with pytest.raises(UserError, match="did you mean 'viscosity'"):
