@@ -29,14 +29,14 @@ def check_size(scenario: "Scenario") -> None:
     expansion = scenario.material.expansion
     most = (sum(boxes) + stream) * (1.0 if expansion is None else 2.0 * expansion.ratio)
     if scenario.pool is not None and scenario.pool > ADDRESSABLE:
-        raise ValueError(f"pool = {float(scenario.pool):.6g}: {_too_many(scenario.pool)}")
+        raise ValueError(f"pool = {float(scenario.pool):.6g}: {too_many(scenario.pool)}")
     if most > 8.0 * ADDRESSABLE:  # bodies may fill little of their boxes; the exact count is judged later
-        raise ValueError(f"spacing = {d:g} m: bodies and nozzle would be {_too_many(most)}")
+        raise ValueError(f"spacing = {d:g} m: bodies and nozzle would be {too_many(most)}")
     far = max(map(abs, (*domain.lower, *domain.upper)))
     if far > RESOLVED * d:
         cells = math.prod((high - low) / d for low, high in zip(domain.lower, domain.upper, strict=True))
         raise ValueError(
-            f"domain: it reaches to {far:.6g} m, {far / d:.3g} spacings, and holds as much as {_too_many(cells)}; "
+            f"domain: it reaches to {far:.6g} m, {far / d:.3g} spacings, and holds as much as {too_many(cells)}; "
             f"single precision resolves positions up to {RESOLVED} spacings ({RESOLVED * d:.3g} m): use a larger "
             "spacing or a smaller domain"
         )
@@ -62,7 +62,7 @@ def check_time(scenario: "Scenario") -> None:
         )
 
 
-def _too_many(particles: float) -> str:
+def too_many(particles: float) -> str:
     """What a number of particles would take, and what there is."""
     import psutil
 

@@ -8,14 +8,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import UserError, quoted, suggestion
-from .mistakes import short, told, unknown_key
+from .mistakes import mistakes, short, unknown_key
 from .numerics import check_numerics, check_sections
 from .scenario import Scenario
 from .units import in_si
 
 DEEPEST = 32  # files that extend one another
 LARGEST = 2**20  # bytes of a scenario file
-MOST_LINES = 5  # mistakes that are told at once
 
 
 def shipped() -> dict[str, Path]:
@@ -97,7 +96,7 @@ def load(reference: str | Path, overrides: dict[str, Any] | list[str] | None = N
 
 def _check_keys(shorter: dict[str, Any], path: Path) -> None:
     """Raise UserError for a key of [quick] that no scenario has, or no method in its section of numerics."""
-    if unknown := unknown_key(shorter):
+    if unknown := unknown_key(shorter, Scenario):
         raise UserError(f"{path}: quick: {unknown}")
     sections = shorter.get("numerics")
     try:
@@ -130,10 +129,7 @@ def validate(table: dict[str, Any], where: str) -> Scenario:
     try:
         scenario = Scenario.model_validate(table)
     except ValidationError as error:
-        found = told(error.errors(include_url=False))
-        lines = list(dict.fromkeys(f"{where}: {line}" for line in found[:MOST_LINES]))
-        more = [f"{where}: and {len(found) - MOST_LINES} more mistakes"] if len(found) > MOST_LINES else []
-        raise UserError("\n".join([*lines, *more])) from None
+        raise mistakes(error, where, Scenario) from None
     except (ArithmeticError, MemoryError, RecursionError) as error:
         raise UserError(f"{where}: cannot be computed with ({type(error).__name__}: {error})") from None
     try:

@@ -1,4 +1,4 @@
-"""Mistakes in a scenario in words that its writer uses: keys and tables, instead of classes and tuples."""
+"""Mistakes in a table in words that its writer uses: keys and tables, instead of classes and tuples."""
 
 from __future__ import annotations
 
@@ -6,27 +6,30 @@ import types
 from collections.abc import Sequence
 from typing import Any, Union, get_args, get_origin
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
-from ..errors import quoted, suggestion
-from .scenario import Scenario
+from ..errors import UserError, quoted, suggestion
 
+MOST_LINES = 5  # mistakes that are told at once
 INNER = ("literal[", "function-", "tagged")  # with what pydantic marks its own steps in a path
 
 
-def told(found: Sequence[Any]) -> list[str]:
-    """Pydantic's errors of a Scenario, each as a line with the key and what would be right."""
-    lines = []
-    for item in found:
-        path, instead = _path(item["loc"])
+def mistakes(error: ValidationError, where: str, root: type[BaseModel]) -> UserError:
+    """The error for whoever wrote a table of the model `root`, which lies `where`: a line a mistake, each with the key
+    and what would be right."""
+    found = []
+    for item in error.errors(include_url=False):
+        path, instead = _path(item["loc"], root)
         unmeant = "literal_error" if isinstance(item["input"], dict) else "model_type"
         if instead is None or item["type"] != unmeant:  # of a word or a table, what was given is said to be wrong
-            lines.append(_line(item, path, instead))
-    return lines
+            found.append(_line(item, path, instead, root))
+    lines = list(dict.fromkeys(f"{where}: {line}" for line in found[:MOST_LINES]))
+    more = [f"{where}: and {len(found) - MOST_LINES} more mistakes"] if len(found) > MOST_LINES else []
+    return UserError("\n".join([*lines, *more]))
 
 
-def unknown_key(table: dict[str, Any], model: type[BaseModel] = Scenario, above: tuple[str, ...] = ()) -> str | None:
-    """What is said of the first key that no scenario has, in a table of some of its keys; None where there is none. The
+def unknown_key(table: dict[str, Any], model: type[BaseModel], above: tuple[str, ...] = ()) -> str | None:
+    """What is said of the first key that a model does not have, in a table of some of its keys; None where there is none. The
     sections of `numerics` are left to their methods."""
     for key, value in table.items():
         if key not in model.model_fields:
@@ -45,35 +48,37 @@ def short(error: object) -> str:
     return text if len(text) <= 450 else f"{text[:450]}..."
 
 
-def _line(item: Any, path: list[str], instead: type[BaseModel] | None) -> str:
+def _line(item: Any, path: list[str], instead: type[BaseModel] | None, root: type[BaseModel]) -> str:
     """One error; `instead`: the model of a table that may stand there instead of a word."""
-    key = quoted(".".join(path))[1:-1] or "scenario"
+    key = quoted(".".join(path))[1:-1] or root.__name__.lower()
     if item["type"] == "extra_forbidden":
-        return f"unknown key '{key}'{suggestion(path[-1], _walk(path[:-1])[1].model_fields)}"
+        return f"unknown key '{key}'{suggestion(path[-1], _walk(path[:-1], root)[1].model_fields)}"
     if item["type"] == "missing" and path[-1].isdigit():
-        return f"{quoted('.'.join(path[:-1]))[1:-1]}: {_list_at(path[:-1])} is wanted (got {quoted(item['input'])})"
+        return (
+            f"{quoted('.'.join(path[:-1]))[1:-1]}: {_list_at(path[:-1], root)} is wanted (got {quoted(item['input'])})"
+        )
     if item["type"] == "missing":
         return f"'{key}' is missing"
-    message = _wanted(item, path) or short(item["msg"]).removeprefix("Value error, ")
+    message = _wanted(item, path, root) or short(item["msg"]).removeprefix("Value error, ")
     if instead is not None:
         message += f", or a table with {', '.join(instead.model_fields)}"
     got = "" if item["type"] == "value_error" else f" (got {quoted(item['input'])})"
     return f"{key}: {message[0].lower()}{message[1:]}{got}"
 
 
-def _wanted(item: Any, path: list[str]) -> str | None:
+def _wanted(item: Any, path: list[str], root: type[BaseModel]) -> str | None:
     """What is wanted where pydantic would name classes of Python."""
     if item["type"] in ("model_type", "dict_type"):
         named = f" [{'.'.join(path)}]" if path and not any(part.isdigit() for part in path) else ""
         return f"a table{named} is wanted"
     if item["type"] in ("tuple_type", "list_type", "too_long"):
-        return f"{_list_at(path)} is wanted"
+        return f"{_list_at(path, root)} is wanted"
     return None
 
 
-def _list_at(path: list[str]) -> str:
+def _list_at(path: list[str], root: type[BaseModel]) -> str:
     """What a list at a path holds."""
-    annotation, _ = _walk(path)
+    annotation, _ = _walk(path, root)
     if _model_in(annotation) is not None:
         return f"a list of tables [[{'.'.join(path)}]]"
     parts = get_args(annotation)
@@ -82,10 +87,10 @@ def _list_at(path: list[str]) -> str:
     return f"a list of {len(parts)} {'numbers' if set(parts) == {float} else 'values'}"
 
 
-def _walk(path: Sequence[str]) -> tuple[Any, type[BaseModel]]:
+def _walk(path: Sequence[str], root: type[BaseModel]) -> tuple[Any, type[BaseModel]]:
     """What a key or an element of a list is annotated with; and the model of the tables there, or around it."""
     annotation: Any = None
-    model: type[BaseModel] = Scenario
+    model = root
     for part in path:
         if part.isdigit():
             annotation = next(iter(get_args(annotation)), None)
@@ -113,7 +118,7 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     return next((found for inner in get_args(annotation) if (found := _model_in(inner)) is not None), None)
 
 
-def _path(loc: Sequence[Any]) -> tuple[list[str], type[BaseModel] | None]:
+def _path(loc: Sequence[Any], root: type[BaseModel]) -> tuple[list[str], type[BaseModel] | None]:
     """The keys of an error's place; and the model of a table that may stand there instead of a word, which pydantic
     names as if it were a key."""
     path: list[str] = []
@@ -123,7 +128,7 @@ def _path(loc: Sequence[Any]) -> tuple[list[str], type[BaseModel] | None]:
             tag = None
         elif not part.startswith(INNER):
             path.append(part)
-            annotation, _ = _walk(path)
+            annotation, _ = _walk(path, root)
             instead = _model_in(annotation) if _is_union(annotation) else None
             tag = None if instead is None else instead.__name__
     return path, instead

@@ -159,8 +159,44 @@ def test_a_body_is_filled_by_functions():
     assert body.velocities.array == pytest.approx(2.0 * x) and body.volumes.array == pytest.approx(np.full(280, 1e-6))
     assert emitted(scenario(bodies=[body])) == 280
     assert len(fb.fill([0] * 3, [0.1] * 3, 0.01).positions) == 1000
-    with pytest.raises(ValueError, match="no point of the lattice is inside"):
-        fb.fill([0] * 3, [0.1] * 3, 0.01, inside=lambda x: x[:, 0] > 1)
+    assert fb.fill(["0 mm"] * 3, np.full(3, 0.1), "1 cm") == fb.fill((0, 0, 0), [0.1] * 3, 0.01)
+    assert fb.fill([0] * 3, [1.0] * 3, 0.5, velocity=lambda x: 2.0).velocities.array.tolist() == [[2.0] * 3] * 8
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"spacing": 1e-9}, r"spacing = 1e-09 m: between the corners are 1e\+27 particles.*67108864 can be addressed"),
+        ({"spacing": 1.0 / 407}, "6.74e.07 particles"),
+        ({"spacing": 1e-320, "upper": [1e18] * 3}, "1e.54 particles"),
+        ({"spacing": 0.0}, "spacing: a positive length is wanted"),
+        ({"spacing": "5 kg"}, "spacing: '5 kg' is of another kind than m"),
+        ({"spacing": "wide"}, "spacing: 'wide' is no number"),
+        ({"spacing": math.nan}, "spacing: a finite number is wanted"),
+        ({"spacing": True}, "spacing: true and false are no lengths"),
+        ({"lower": [0, 0]}, "lower: three lengths are wanted"),
+        ({"upper": [[1, 1, 1]]}, "upper: three lengths are wanted"),
+        ({"upper": 1.0}, "upper: three lengths are wanted"),
+        ({"upper": [1, 1, None]}, "upper: None is no number"),
+        ({"upper": [1, -1, 1]}, "upper is to lie above lower; along y they are -1 and 0 m"),
+        ({"lower": [0, 0, 1]}, "along z they are 1 and 1 m"),
+        ({"inside": lambda x: x[:, 0] > 1}, "no point of the lattice is inside"),
+        (
+            {"inside": lambda x: x > 0.5},
+            r"inside: values of shape \(n,\), n = 1000, .*got shape \(1000, 3\)",
+        ),
+        ({"inside": lambda x: x[:, 0] > 0 and x[:, 1] > 0}, "inside failed for points of shape .*truth value"),
+        ({"inside": "x > 0"}, "inside: a function of points"),
+        ({"velocity": lambda x: x[:, 0]}, r"velocity: values of shape \(n, 3\)"),
+        ({"velocity": lambda x: "fast"}, r"velocity: values of shape .*\(got 'fast'\)"),
+        ({"velocity": lambda x: x / 0.0}, "finite numbers"),
+        ({"clampt": True}, "unknown key 'clampt'; did you mean 'clamped'"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:divide by zero")
+def test_what_cannot_be_filled_is_said(change, words):
+    with pytest.raises(UserError, match=f"^fill: .*?{words}"):
+        fb.fill(**{"lower": [0, 0, 0], "upper": [1, 1, 1], "spacing": 0.1} | change)
 
 
 def test_what_is_cut_is_not_compared_with_what_is_whole():
@@ -196,5 +232,3 @@ def test_only_real_numbers_are_packed():
     for wrong in (np.ma.masked_array([1.0, 2.0], [0, 1]), np.array([1j])):
         with pytest.raises(ValueError, match="masked and complex"):
             Packed(wrong)
-    with pytest.raises(ValueError, match="spacing must be positive"):
-        fb.fill([0] * 3, [0.1] * 3, 0)
