@@ -12,9 +12,10 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
 from annotated_types import Gt
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from ..errors import suggestion
+from .mistakes import mistakes
 from .units import in_si
 
 LARGEST, SMALLEST = 1e18, 1e-18  # whose squares are float32s
@@ -89,11 +90,19 @@ class Model(BaseModel):
         return hash((type(self), *self._values()))
 
     def _values(self) -> tuple[Any, ...]:
-        return tuple(getattr(self, name) for name in type(self).model_fields)
+        return tuple(self._table().values())
+
+    def _table(self) -> dict[str, Any]:
+        """The values by key, those of models as they are."""
+        return {name: getattr(self, name) for name in type(self).model_fields}
 
     def replace(self, **changes: Any) -> Self:
-        """The same with some values changed, validated like any other; raises pydantic's ValidationError."""
-        return type(self).model_validate({name: getattr(self, name) for name in type(self).model_fields} | changes)
+        """The same with some values changed, in SI units or with a unit, validated like any other; raises UserError
+        with one line a mistake, each with the key and the cure."""
+        try:
+            return type(self).model_validate(self._table() | changes)
+        except ValidationError as error:
+            raise mistakes(error, type(self).__name__.lower(), type(self)) from None
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy, not validated; what is derived from values (cached properties) is derived anew."""

@@ -6,7 +6,7 @@ It is read from TOML (`load`), or built in Python from the same classes.
 
 import math
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -144,6 +144,13 @@ class Scenario(Model):
     def _check_force(self) -> None:
         if self.body_force_gradient is not None and not np.allclose(self.gradient, self.gradient.T):
             raise ValueError("body_force_gradient must be symmetric: only then has the force a potential")
+
+    def replace(self, **changes: Any) -> Self:
+        """The same with some values changed, in SI units or with a unit, validated like a file; raises UserError with
+        one line a mistake, each with the key and the cure, as `load` does."""
+        from .library import validate
+
+        return cast(Self, validate(self._table() | changes, self.name))
 
     @cached_property
     def track(self) -> Track | None:

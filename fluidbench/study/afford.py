@@ -6,6 +6,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from ..errors import UserError
 from ..registry import get_method
 from ..scenario import Scenario
 from .estimate import estimate
@@ -58,7 +59,7 @@ def _spaced(scenario: Scenario, factors: Sequence[float]) -> list[Scenario]:
     for factor in factors:
         try:
             found.append(scenario.replace(spacing=factor * scenario.spacing))
-        except ValueError:
+        except UserError:
             continue
     return found
 

@@ -70,7 +70,7 @@ def test_copies_forget_what_was_derived():
     assert s.replace(spacing=0.02).spacing == 0.02 and s.spacing == 0.01
     numbers = Numbers()
     assert numbers.replace(some=2.0) == Numbers(some=2.0) and numbers.some == 0.0
-    with pytest.raises(ValidationError):
+    with pytest.raises(UserError, match="numbers: some: "):
         numbers.replace(some=-1.0)
 
 
