@@ -33,6 +33,13 @@ def length(text: str) -> float:
         raise UserError(f"--spacing takes a length such as 0.002 or 2mm: {error}") from None
 
 
+def folder(text: str) -> Path:
+    """A folder's path; raises UserError for none, which would be the current one."""
+    if not text.strip():
+        raise UserError(f"--out takes an output folder (got {quoted(text)}); `--out .` is the current one")
+    return Path(text)
+
+
 Spacing = Annotated[
     float | None,
     typer.Option(
@@ -53,7 +60,10 @@ Threads = Annotated[
         show_default=False,
     ),
 ]
-Out = Annotated[Path | None, typer.Option(help="output folder; default fluidbench-out/ and the scenario or verb")]
+Out = Annotated[
+    Path | None,
+    typer.Option(parser=folder, metavar="PATH", help="output folder; default fluidbench-out/ and the scenario or verb"),
+]
 WallLimit = Annotated[float, typer.Option(help="seconds a run may take; what cannot make it is stopped early")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="run everything again, whatever is stored")]
 Jobs = Annotated[
@@ -183,10 +193,13 @@ def placed(options: Options, default: str) -> Options:
 
 
 def load_scenario(name: str, settings: list[str] | None, spacing: float | None, quick: bool = False) -> Scenario:
+    """The scenario as the command line has it; raises UserError for what is none, and for a spacing given twice."""
     from ..scenario.library import load
 
     if spacing is not None and not (math.isfinite(spacing) and spacing > 0):
         raise UserError(f"--spacing takes a positive number of metres; got {spacing:g}")
+    if spacing is not None and any(text.partition("=")[0].strip() == "spacing" for text in settings or []):
+        raise UserError("--spacing and --set spacing=... both give the spacing; give one of them")
     extra = [f"spacing={spacing!r}"] if spacing is not None else []
     return load(name, [*(settings or []), *extra], quick)
 

@@ -246,7 +246,7 @@ def table1(
 
     resolved = load_scenario(scenario, set_, spacing)
     if quick and spacing is None:
-        resolved = load_scenario(scenario, set_, coarser(resolved))
+        resolved = resolved.replace(spacing=coarser(resolved))
     finish(study(resolved, repeats=repeats_of(repeats), quick=quick, seed=seed, **placed(options, "table1")))
 
 

@@ -278,9 +278,9 @@ MAY = {
     "--axis": ("",),
     "--solver": ("", "mpm,sph"),
     "--backend": ("warp,",),
-    "--out": ("", ".", "a\x1b[31mb", "\udcff", "名前", "-x"),
+    "--out": (".", "a\x1b[31mb", "\udcff", "名前", "-x"),
 }
-OUTS = ("/proc/nowhere", "/dev/null/x", "file", "file/below", "x" * 5000, "a\x00b", "/sys/x", "x/" * 3000)
+OUTS = ("", " ", "/proc/nowhere", "/dev/null/x", "file", "file/below", "x" * 5000, "a\x00b", "/sys/x", "x/" * 3000)
 AMOUNT = r"(?i)\d[^\n]{0,40}(particle|step|tick|byte|[kmgtpezy]i?b\b|output|snapshot|picture|slot|run|core|thread)"
 
 
@@ -296,6 +296,7 @@ def lists(rng: random.Random) -> Iterator[Case]:
         for verb, value in itertools.product(HAS[option], values):
             told = (
                 option,
+                option.strip("-"),
                 "over",
                 "one folder down",
                 "xxx",
@@ -309,6 +310,9 @@ def lists(rng: random.Random) -> Iterator[Case]:
                 "--executor",
             )
             yield Case("lists and names of options", command(verb, f"{option}={value}"), names=told)
+    for verb in HAS["--spacing"]:
+        twice = command(verb, "--spacing", "2mm", "--set", "spacing=3e-3")
+        yield Case("lists and names of options", twice, names=("--spacing and --set spacing",))
     for verb in HAS["--backend"]:
         if verb != "compare":
             one = command(verb, "--backend", "warp,taichi")

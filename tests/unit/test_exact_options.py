@@ -1,6 +1,7 @@
 """Options of the command line: what is accepted, and what is refused just beyond."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -117,6 +118,21 @@ def test_counts_and_repeats():
         options.repeats_of(1001)
 
 
+def test_the_spacing_is_given_once():
+    assert options.load_scenario("line_bead", ["spacing=3e-3"], None).spacing == 3e-3
+    assert options.load_scenario("line_bead", ["material.density=900", "nozzle.standoff=0.01"], 2e-3).spacing == 2e-3
+    for text in ("spacing=3e-3", " spacing = 2 mm", "spacing=2e-3"):
+        with pytest.raises(UserError, match=r"^--spacing and --set spacing=\.\.\. both give the spacing"):
+            options.load_scenario("line_bead", [text], 2e-3)
+
+
+@pytest.mark.parametrize("text", ["", " "])
+def test_no_folder_is_not_the_current_one(text):
+    with pytest.raises(UserError, match=r"^--out takes an output folder .*`--out \.` is the current one"):
+        options.folder(text)
+    assert options.folder(".") == Path() and options.folder("a/b") == Path("a/b")
+
+
 def test_names_in_a_list():
     assert options.names_in(" a, b ,c", "--x", "thing") == ["a", "b", "c"]
     for text, words in (
@@ -191,8 +207,8 @@ def test_a_run_that_is_alone_has_all_cores(monkeypatch):
     assert workplace.threads_alone(large, "splishsplash-wcsph", Target()) == 1
 
 
-def test_the_spacing_option_comes_last():
-    assert options.load_scenario("line_bead", ["spacing=0.002", "seed=3"], 0.001).spacing == 0.001
+def test_the_spacing_option_is_a_positive_length():
+    assert options.load_scenario("line_bead", ["seed=3"], 0.001).spacing == 0.001
     assert options.load_scenario("line_bead", None, None, quick=True).spacing == pytest.approx(2e-3)
     for value in (0.0, -1.0, math.inf, math.nan):
         with pytest.raises(UserError, match="--spacing takes a positive number of metres"):
