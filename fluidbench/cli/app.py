@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,23 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Measure MPM, weakly compressible SPH and PBD on identical extrusion scenarios: fidelity beside cost.",
 )
+
+
+def _tell_version(asked: bool) -> None:
+    from .. import __version__
+
+    if asked:
+        typer.echo(f"fluidbench {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", help="say which version this is", callback=_tell_version, is_eager=True)
+    ] = False,
+) -> None:
+    """What goes before any command."""
 
 
 def finish(result: Result, width: int | None = 120) -> None:

@@ -1,9 +1,11 @@
 """Warp as a guest: what it says of itself belongs in no result, and what it compiles needs a folder."""
 
+import contextlib
 import functools
 import os
 import stat
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -80,6 +82,33 @@ def quiet_warp() -> None:
     wp.config.log_level = wp.LOG_ERROR
     if CACHE in kernels().variables and wp.config.kernel_cache_dir is None:  # Warp has not settled on one
         wp.config.kernel_cache_dir = str(kernels().folder)
+
+
+def start_warp() -> None:
+    """Start Warp, quietly: on a machine without a GPU its library would write so to standard error by itself."""
+    import warp as wp
+
+    quiet_warp()
+    with _hushed():
+        wp.init()
+
+
+@contextlib.contextmanager
+def _hushed() -> Iterator[None]:
+    """What any library writes to standard error goes nowhere meanwhile; errors are exceptions all the same."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # it is closed
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def note_launch() -> None:

@@ -106,13 +106,12 @@ def diagnosis() -> list[str]:
 def _devices() -> list[str]:
     import warp as wp
 
-    from ..native.device import kernels, quiet_warp
+    from ..native.device import kernels, start_warp
 
     try:
-        quiet_warp()
+        start_warp()
     except Obstacle as error:
         return [f"kernels: {error}"]
-    wp.init()
     lines = [f"kernels: {kernels().note or f'compiled into {kernels().folder}'}", "device cpu: available"]
     for device in wp.get_cuda_devices():
         lines.append(f"device {device.alias}: {device.name}, {device.total_memory / 2**30:.1f} GiB, sm_{device.arch}")

@@ -125,7 +125,7 @@ def shaken(scenario: Scenario, seed: int) -> Scenario:
 
 def _factor(level: str) -> float:
     if level not in LEVELS:
-        raise UserError(f"no level {quoted(level)}{suggestion(level, LEVELS)}; there are {', '.join(LEVELS)}")
+        raise UserError(f"no level {quoted(level)}{suggestion(level, LEVELS)}")
     return LEVELS[level]
 
 

@@ -276,10 +276,9 @@ def visible_gpus() -> tuple[str, ...]:
     """The GPUs that there are, in the words of CUDA_VISIBLE_DEVICES; raises UserError where there is none."""
     import warp as wp
 
-    from ..native.device import quiet_warp
+    from ..native.device import start_warp
 
-    quiet_warp()
-    wp.init()
+    start_warp()
     if not (found := len(wp.get_cuda_devices())):
         raise UserError("no GPU on this machine (`fluidbench doctor`)")
     given = os.environ.get("CUDA_VISIBLE_DEVICES", "")
@@ -291,10 +290,9 @@ def _check_device(device: str) -> None:
         return
     import warp as wp
 
-    from ..native.device import quiet_warp
+    from ..native.device import start_warp
 
-    quiet_warp()
-    wp.init()
+    start_warp()
     known = ["cpu", *[d.alias for d in wp.get_cuda_devices()]]
     if device not in known:
         raise UserError(f"no device {quoted(device)} on this machine; it has {', '.join(known)} (`fluidbench doctor`)")

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 
 import pandas as pd
@@ -46,7 +47,8 @@ MISTAKES = [
     (["run", "line_bead", "--out", "/proc/nowhere"], "cannot write"),
     (["show", "line_bead", "--set", "material.density=-3"], "material.density"),
     (["validate", "free_fal"], "did you mean 'free_fall'"),
-    (["validate", "free_fall", "--levels", "finest"], "no level 'finest'"),
+    (["validate", "free_fall", "--levels", "finest"], "no level 'finest'; did you mean 'fine'?"),
+    (["validate", "free_fall", "--levels", "foo"], "no level 'foo'; known: coarse, fine, medium, rough"),
 ]
 
 
@@ -57,6 +59,7 @@ def test_mistakes_are_one_line_and_exit_code_2(arguments, words, tmp_path):
     done = fluidbench(*arguments)
     assert done.returncode == 2
     assert words in done.stderr and "Traceback" not in done.stderr
+    assert all(line.startswith("fluidbench: ") for line in done.stderr.splitlines())  # nor a word of Warp's
     assert not (tmp_path / "out").exists()
 
 
@@ -166,7 +169,13 @@ def test_list_show_and_doctor_answer():
     assert "line_bead" in fluidbench("list").stdout and "mpm" in fluidbench("list").stdout
     shown = fluidbench("show", "dam_break").stdout
     assert "wave speed" in shown and "acoustic" in shown and "substeps" in shown
-    assert "warp-lang" in fluidbench("doctor").stdout
+    told = fluidbench("doctor")
+    assert "warp-lang" in told.stdout and told.stderr == ""
+
+
+def test_the_version_is_told():
+    done = fluidbench("--version")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"fluidbench {version('fluidbench')}\n", "")
 
 
 def test_what_a_terminal_cannot_show_is_replaced(tmp_path, monkeypatch):

@@ -560,7 +560,13 @@ def legitimate(rng: random.Random) -> Iterator[Case]:
     right += [command("table2", "--pools", v) for v in ("fit", "298000", "298000,fit")]
     right += [command("table2", "--variants", v) for v in ("plain", "curing, plain", "expansion + curing")]
     right += [command("compare", "--repeats", "3"), command("run", "--frames", "--render-every", "0.1")]
-    right += [command("validate", "elliptic_drop", "--jobs", "1"), command("table1"), ("list",), ("doctor",)]
+    right += [
+        command("validate", "elliptic_drop", "--jobs", "1"),
+        command("table1"),
+        ("list",),
+        ("doctor",),
+        ("--version",),
+    ]
     right += [command("compare", "--backend", "warp"), command("run", "--spacing", "2e-3", "--out", "deep/er")]
     for words in right:
         if "deep/er" not in words:
