@@ -29,8 +29,8 @@ def mistakes(error: ValidationError, where: str, root: type[BaseModel]) -> UserE
 
 
 def unknown_key(table: dict[str, Any], model: type[BaseModel], above: tuple[str, ...] = ()) -> str | None:
-    """What is said of the first key that a model does not have, in a table of some of its keys; None where there is none. The
-    sections of `numerics` are left to their methods."""
+    """What is said of the first key that a model does not have, in a table of some of its keys; None where there is
+    none. The sections of `numerics` are left to their methods."""
     for key, value in table.items():
         if key not in model.model_fields:
             return f"unknown key '{quoted('.'.join([*above, key]))[1:-1]}'{suggestion(key, model.model_fields)}"
