@@ -159,7 +159,8 @@ def _tell(batch: Sequence[Point], told: dict[str, Any]) -> None:
             continue
         point.verdict, point.measures = told["verdict"], own["measures"]
         point.cost, point.together = told["cost"], len(batch)
-        point.print, point.warnings = own["print"] or "", own["warnings"]
+        point.print = own["print"] or ""
+        point.warnings = [*point.scenario.warnings(), *own["warnings"]]  # as those of a point that ran alone
 
 
 def _experiment(chunk: Sequence[Sequence[Point]], place: Workplace) -> Experiment:

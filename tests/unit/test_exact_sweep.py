@@ -179,6 +179,13 @@ def test_a_batch_gives_each_point_its_own(monkeypatch, tmp_path):
     assert "shared" in found.report.machine and found.table.wall_s.tolist() == [4.0] * 4
 
 
+def test_a_point_of_a_batch_tells_the_warnings_of_its_own_scenario(monkeypatch, tmp_path):
+    working(monkeypatch, batches())
+    found = fb.sweep("line_bead", {"material.youngs_modulus": [50.0, 60.0]}, ["mpm"], worlds=2, out=tmp_path)
+    told = [note for note in found.report.notes if "wave speed" in note]
+    assert [note.partition(":")[0] for note in told] == [f"mpm, material.youngs_modulus = {e}" for e in (50.0, 60.0)]
+
+
 @pytest.mark.parametrize("verdict", ["diverged", "timeout", CRASH])
 def test_points_of_a_batch_that_failed_run_alone(monkeypatch, tmp_path, verdict):
     found, calls = run_sweep(monkeypatch, tmp_path, verdict, worlds=8)
