@@ -33,7 +33,7 @@ def ablate(
     **options: Unpack[Options],
 ) -> Ablated:
     """Switch physical features off and numerical economies on, one at a time: what moves, what is saved. Ends with the
-    leanest mix that moves no length by more than the `tolerance`, a share as 0.05 or "5%",
+    leanest mix that moves no length by more than the `tolerance`, a share [-], as 0.05 or "5%",
     confirmed by a run.
 
     `scenario` is one, a shipped name or a TOML file; `methods` are names, default all. `called` and `given` are the
