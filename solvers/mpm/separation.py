@@ -4,7 +4,7 @@ Where matter is sheared, particles that a grid carries along come as near to eac
 what has no velocity gradient. They line up in threads with gaps between, and what is measured finer than a cell finds
 less matter than there is. So every few ticks, where matter flows, pairs nearer than a spacing leave each other as in
 SPH (../crowding.py), in proportion to the strain meanwhile; those that touch, nearer than a quarter of one, at once,
-wherever matter deforms: what hardly flows brings single pairs so near, and leaves them there. What the grid does see of
+wherever both deform: what hardly flows brings single pairs so near, and leaves them there. What the grid does see of
 these shifts, their mean over its nodes, is taken off again, and once more of what is left: it would widen whatever is
 strained (a flattened drop by 6 % of its radius), for no volume ratio knows of it. Velocities stay: the momentum of
 nodes is changed by no more than how the field bends within a cell.

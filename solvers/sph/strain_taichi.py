@@ -88,12 +88,14 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
     @ti.func
     def strain_across(num, box, code, own, other, r, sums):
         out = sums
+        w = other[3] * slope(r.norm() / num.h, num.h)
+        if ti.static(changing):
+            w *= own[11] / other[11]
+        v, m = vector_at(other, 4), w * turned_back(box, code) * r
         if ti.static(tensile):
-            w = other[3] * slope(r.norm() / num.h, num.h)
-            if ti.static(changing):
-                w *= own[11] / other[11]
-            turned = vector_at(other, 4).outer_product(turned_back(box, code) * r)
-            out = matrix_into(out, 1, stressed(out, 1) - w * turned)
+            out = matrix_into(out, 1, stressed(out, 1) - v.outer_product(m))
+        else:
+            out[1] += v.dot(m)
         return out
 
     strained_by = over_pairs(MATTER, many, strain_pair, matter_seen, strain_across)

@@ -130,14 +130,17 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
 
     @wp.func
     def across(num: Smoothing, back: wp.vec3, own: Own, other: Other, r: wp.vec3, sums: Sums):
+        w = other[3] * slope(wp.length(r) / num.h, num.h)
+        if wp.static(changing):
+            w *= own[11] / other[11]
+        m = w * wp.cw_mul(back, r)
+        v = wp.vec3(other[4], other[5], other[6])
         if wp.static(tensile):
-            w = other[3] * slope(wp.length(r) / num.h, num.h)
-            if wp.static(changing):
-                w *= own[11] / other[11]
-            for b in range(3):
-                m = w * back[b] * r[b]
-                for a in range(3):
-                    sums[1 + 3 * a + b] -= m * other[4 + a]
+            for a in range(3):
+                for b in range(3):
+                    sums[1 + 3 * a + b] -= v[a] * m[b]
+        else:
+            sums[1] += wp.dot(v, m)
         return sums
 
     @wp.func
