@@ -38,7 +38,7 @@ def main() -> None:
         sys.stderr.close()
         sys.exit(1)
     except OSError as error:
-        if why := streams.unprintable(error):
+        if why := streams.unprintable():
             _leave(1, f"cannot print to standard output: {why}")
         _leave(1, of_system(error))
 

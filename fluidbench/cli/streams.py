@@ -1,12 +1,9 @@
 """Standard streams as the system gives them: closed, full, or without the letters that are printed."""
 
-import errno
 import io
 import os
 import sys
 from pathlib import Path
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def ready() -> None:
@@ -21,13 +18,12 @@ def ready() -> None:
         sys.stdout.reconfigure(errors="replace")
 
 
-def unprintable(error: OSError) -> str:
-    """Why standard output takes nothing more, if that is what an error is of, and else nothing. What was not printed is
-    thrown away then, or Python would fail at it once more as it ends."""
-    why = error.strerror or str(error) if error.filename is None and error.errno in FULL else ""
+def unprintable() -> str:
+    """Why standard output takes nothing more, and nothing where it does. What was not printed is thrown away then, or
+    Python would fail at it once more as it ends."""
     try:
         sys.stdout.flush()
     except OSError as stuck:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        why = stuck.strerror or str(stuck)
-    return why
+        return stuck.strerror or str(stuck)
+    return ""

@@ -38,10 +38,12 @@ def kernels() -> Kernels:
     given = os.environ.get(CACHE)
     folder = Path(given) if given else platformdirs.user_cache_path("warp", "NVIDIA")
     variables, note = {}, ""
+    if given == "":  # of which Warp makes the current folder
+        variables[CACHE] = str(folder)
     if why := _refused(folder):
         meant, folder = folder, _own_temporary(why)
         variables[CACHE] = str(folder)
-        note = f"{meant} is no folder for compiled kernels ({why}); they go to {folder}: {CURE}"
+        note = f"no kernels can be compiled into {meant} ({why}); they go to {folder}: {CURE}"
     beside = os.environ.get(TAICHI_CACHE)
     if _refused(Path(beside) if beside else platformdirs.user_cache_path("taichi")):
         variables[TAICHI_CACHE] = str(folder / "taichi")
@@ -75,20 +77,20 @@ def _own_temporary(why: str) -> Path:
 
 
 def quiet_warp() -> None:
-    """Keep Warp from announcing itself, its modules and missing GPUs, of which `fluidbench doctor` tells, and give it a
-    folder for kernels; raises Obstacle where there is none."""
+    """Keep Warp from announcing itself, its modules and missing GPUs, of which `fluidbench doctor` tells."""
     import warp as wp
 
     wp.config.log_level = wp.LOG_ERROR
-    if CACHE in kernels().variables and wp.config.kernel_cache_dir is None:  # Warp has not settled on one
-        wp.config.kernel_cache_dir = str(kernels().folder)
 
 
 def start_warp() -> None:
-    """Start Warp, quietly: on a machine without a GPU its library would write so to standard error by itself."""
+    """Start Warp with a folder for kernels, quietly: on a machine without a GPU its library would write so to standard
+    error by itself. Raises Obstacle where there is no such folder."""
     import warp as wp
 
     quiet_warp()
+    if CACHE in kernels().variables and wp.config.kernel_cache_dir is None:  # Warp has not settled on one
+        wp.config.kernel_cache_dir = str(kernels().folder)
     with _hushed():
         wp.init()
 

@@ -1,6 +1,7 @@
 """What a child leaves, what it cost, and where its kernels are compiled into."""
 
 import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -228,8 +229,34 @@ def test_a_variable_names_the_folder_of_kernels(homeless, tmp_path, monkeypatch,
     monkeypatch.setenv(variable, str(tmp_path / "mine"))
     found = device.kernels()
     assert found.folder in (tmp_path / "mine", tmp_path / "mine" / "warp") and not found.note
-    assert device.CACHE not in interpreter.environment() or variable == device.CACHE
+    assert interpreter.environment().get(device.CACHE) == os.environ.get(device.CACHE)
     assert not homeless.exists() and f"kernels: compiled into {found.folder}" in diagnosis()
+
+
+def test_an_empty_variable_is_none(homeless, tmp_path, monkeypatch):
+    """Warp would take it for the current folder."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "mine"))
+    monkeypatch.setenv(device.CACHE, "")
+    assert device.kernels() == device.Kernels(
+        tmp_path / "mine" / "warp", {device.CACHE: str(tmp_path / "mine" / "warp")}
+    )
+
+
+@pytest.mark.parametrize(("command", "code"), [("list", 0), ("show line_bead", 0), ("run line_bead --quick", 1)])
+def test_what_compiles_nothing_needs_no_folder_for_kernels(tmp_path, command, code):
+    (tmp_path / f"fluidbench-kernels-{os.getuid()}").write_text("")
+    nowhere = {
+        device.CACHE: "/dev/null/x",
+        "XDG_CACHE_HOME": "/dev/null/y",
+        "HOME": "/dev/null",
+        "TMPDIR": str(tmp_path),
+    }
+    words = [sys.executable, "-m", "fluidbench", *command.split(), *(["--out", str(tmp_path / "out")] if code else [])]
+    done = subprocess.run(
+        words, capture_output=True, text=True, env=os.environ | nowhere, cwd=Path(__file__).parents[2]
+    )
+    assert done.returncode == code, done.stderr
+    assert ("no folder for compiled kernels" in done.stderr) == bool(code)
 
 
 @pytest.mark.parametrize("trap", ["file", "open to all", "link"])
