@@ -48,7 +48,8 @@ def wanting(one: Measured, scenario: Scenario) -> str | None:
         return _wanting_of_a_layer(one, one.layer, scenario)
     moves = scenario.track is not None and scenario.toolpath is not None and scenario.toolpath.speed > 0
     if one.key in ALONG and not moves:
-        return f"quantity: {one.words} is of a bead, and the scenario has no path that one is laid along"
+        instead = "; of a block it is height_m, of anything top" if one.key == "bead_height_m" else ""
+        return f"quantity: {one.words} is of a bead, and the scenario has no path that one is laid along{instead}"
     if one.place is not None and not _is_along(one.place, station := stations(scenario)):
         low, high = 1e3 * station[0], 1e3 * station[-1]
         return f"place: beads are measured from {low:.6g} to {high:.6g} mm along the path (got {1e3 * one.place:g} mm)"
@@ -58,7 +59,9 @@ def wanting(one: Measured, scenario: Scenario) -> str | None:
         return f"quantity: {one.words} is of a ring, and the scenario has none"
     for kind, keys in (("cylinder", OF_A_CYLINDER), ("box", OF_A_BOX)):
         if one.key in keys and not _begins_with(kind, scenario):
-            return f"quantity: {one.words} is of a {kind} that is there at the start, and the first body is none"
+            later = any(body.start > 0 for body in scenario.bodies)
+            why = "a body comes later (start)" if later else "the first body is none"
+            return f"quantity: {one.words} is of a {kind} that is there at the start, and {why}"
     return None
 
 

@@ -76,9 +76,8 @@ def understand(text: str, name: str = "G-code") -> Program:
         code = "" if found is None else found[1].strip()
         if code and code != "%":
             try:
-                said: dict[str, float | None] = {}
                 for command in commands_in(code):
-                    _obey(machine, command, number, said)
+                    _obey(machine, command, number)
             except ValueError as error:
                 raise ValueError(f"{name}, line {number}: {error}") from None
     if not machine.moves:
@@ -88,8 +87,8 @@ def understand(text: str, name: str = "G-code") -> Program:
     return Program(points, table[:, 3], table[:, 4], table[:, 5], table[:, 6] > 0, machine.ignored)
 
 
-def _obey(m: _Machine, code: str, number: int, said: dict[str, float | None]) -> None:
-    """One command, without comments; `said`: the words of those before it in its line."""
+def _obey(m: _Machine, code: str, number: int) -> None:
+    """One command, without comments."""
     found = COMMAND.fullmatch(code)
     if found is None:
         if UNCOMMANDED.fullmatch(code):
@@ -103,25 +102,26 @@ def _obey(m: _Machine, code: str, number: int, said: dict[str, float | None]) ->
     if act is None and name not in MODES:
         m.ignored.setdefault(code.upper(), []).append(number)
         return
-    words = _words(name, found[3], said)
+    words = _words(name, found[3])
     if name in MODES:
         _switch(m, name)
     elif act is not None:
         act(m, words)
 
 
-def _words(name: str, text: str, said: dict[str, float | None]) -> dict[str, float | None]:
-    """The words of a command by their letters, added to what its line has `said` before."""
+def _words(name: str, text: str) -> dict[str, float | None]:
+    """The words of a command by their letters. Of two speeds the last counts, as it does for printers; slicers write
+    such lines (`G1 X267 F18000 F8000`)."""
     words: dict[str, float | None] = {}
     for letter, value in words_in(text):
         if letter in "GMT":
             raise ValueError(f"{name} and a second command, {letter}, beside words without a number; write two lines")
         if letter not in LETTERS.get(name, letter):
             raise ValueError(f"{name} has no word {quoted(letter)}; it has {', '.join(LETTERS[name])}")
-        if letter in said:
-            twice = " and ".join(letter if v is None else f"{letter}{v:g}" for v in (said[letter], value))
-            raise ValueError(f"{letter} is there twice, {twice}; a line may have each word once")
-        words[letter] = said[letter] = value
+        if letter in words and letter != "F":
+            twice = " and ".join(letter if v is None else f"{letter}{v:g}" for v in (words[letter], value))
+            raise ValueError(f"{letter} is there twice, {twice}; a command may have it once")
+        words[letter] = value
     return words
 
 
