@@ -68,13 +68,16 @@ def mirroring_faces(box: Box, code: int):
 
 
 @wp.func
-def rough_faces(box: Box, code: int):
-    """1 for each axis on which the code mirrors in a friction wall."""
-    rough = wp.vec3(0.0, 0.0, 0.0)
+def kinds_of_faces(box: Box, code: int):
+    """1 for each axis on which the code mirrors in a friction wall, -1 where in a no-slip wall."""
+    kinds = wp.vec3(0.0, 0.0, 0.0)
     for axis in range(3):
-        if face_kind(box, code, axis) == FRICTION:
-            rough[axis] = 1.0
-    return rough
+        kind = face_kind(box, code, axis)
+        if kind == FRICTION:
+            kinds[axis] = 1.0
+        elif kind == STICK:
+            kinds[axis] = -1.0
+    return kinds
 
 
 @wp.func

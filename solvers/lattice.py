@@ -7,7 +7,7 @@ import numpy as np
 
 from fluidbench.method.timestep import damped_limit
 
-from .smoothing import wendland_slope
+from .smoothing import drag_weight, wendland_slope
 
 
 def lattice(support: float) -> np.ndarray:
@@ -30,18 +30,42 @@ def sloping(ratio: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def lattice_moments(ratio: float) -> tuple[float, float]:
-    """Sums over a unit lattice with h = ratio, each 1 in the continuum: the second moment -sum V r^2 W' / (3 r), which
-    scales summed density, and the fourth -5 sum V x^2 z^2 W' / r^3, which scales viscosity in shear."""
+def lattice_moment(ratio: float) -> float:
+    """-sum V r^2 W' / (3 r) over a unit lattice with h = ratio, 1 in the continuum: scales summed density."""
     places, slopes = sloping(ratio)
-    r2 = (places**2).sum(axis=1)
-    fourth = slopes * places[:, 0] ** 2 * places[:, 2] ** 2 / np.maximum(r2, 1.0)
-    return float((slopes * r2).sum() / 3.0), float(5.0 * fourth.sum())
+    return float((slopes * (places**2).sum(axis=1)).sum() / 3.0)
 
 
-def viscous_scale(ratio: float) -> float:
-    """What viscosity is multiplied by: the geometric mean of what shear along the axes of a lattice needs, and of 1."""
-    return lattice_moments(ratio)[1] ** -0.5
+@cache
+def stiffest_drag(support: float, thinnest: float) -> float:
+    """The fastest rate [nu / d^2] at which pairs damp a wave (viscosity.py), `support` in spacings, with no fullness
+    below `thinnest`: in a lattice, or in sheets and threads of it, up to three thick, where each pair stands for
+    more."""
+    shapes = [(1, 1, 1), *((0, 1, 1), (0, 0, 1)) * 3]
+    return max(
+        _fastest(np.array(wide), layers, support, thinnest)
+        for wide, layers in zip(shapes, (1, 1, 1, 2, 2, 3, 3), strict=True)
+    )
+
+
+def _fastest(wide: np.ndarray, layers: int, support: float, thinnest: float) -> float:
+    """The same of matter that goes on along the axes `wide`, and is so many spacings thick along the others."""
+    reach = int(support) + 1
+    ways, thick = (np.array(list(np.ndindex(*n)), float) for n in (2 * reach * wide + 1, np.where(wide, 1, layers)))
+    away = ways - reach * wide
+    r = thick[:, None, None] - thick[None, :, None] - away  # (own, other, cell, 3)
+    r2 = (r * r).sum(axis=-1)
+    weight = np.vectorize(lambda q: drag_weight(q, support))(np.sqrt(r2) / support)
+    full = np.sqrt(np.maximum((weight * r2).sum(axis=(1, 2)) / 3.0, thinnest))
+    weight *= 10.0 / (full[:, None, None] * full[None, :, None] * np.maximum(r2, 1.0))
+    pulls = np.einsum("ijc,ijca,ijcb->ijcab", weight, r, r)
+    n, fastest = len(thick), 0.0
+    for wave in np.ndindex(*(6 * wide + 1)):
+        turn = np.exp(1j * away @ (np.pi / 6.0 * np.array(wave)))
+        matrix = -np.einsum("ijcab,c->iajb", pulls, turn)
+        matrix[range(n), :, range(n), :] += pulls.sum(axis=(1, 2))
+        fastest = max(fastest, float(np.linalg.eigvalsh(matrix.reshape(3 * n, 3 * n))[-1]))
+    return fastest
 
 
 @cache

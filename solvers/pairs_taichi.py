@@ -13,7 +13,7 @@ def as_seen(box, extra: ti.template(), row, j, code):
 
 
 @ti.func
-def as_summed(num, box, code, own, other, r, sums):
+def as_summed(num, box, code, own, begun, other, r, sums):
     return sums
 
 
@@ -89,7 +89,8 @@ def over_pairs(
 ) -> Callable:
     """The function that sums pair(num, own, begun, other, r) over the neighbours of a particle: `own` and `other` are
     rows of `length` floats, `begun` is what the particle brings beside, r points from the neighbour. An image's row is
-    seen(box, extra, row, j, code), and what it adds across(num, box, code, own, other, r, sums)."""
+    seen(box, extra, row, j, code), and what it adds across(num, box, code, own, begun, other, r,
+    sums)."""
     read = reader(length)
 
     @ti.func
@@ -118,7 +119,7 @@ def over_pairs(
                 r = vector_at(own, 0) - vector_at(other, 0)
                 add = pair(num, own, begun, other, r)
                 if code > 0:
-                    add = across(num, box, code, own, other, r, add)
+                    add = across(num, box, code, own, begun, other, r, add)
                 total += add
         return total
 

@@ -9,7 +9,7 @@ from fluidbench.native.scene import STICK
 from .conjugate_taichi import KERNELS
 from .neighbours_taichi import BoxT, ListsT, face_kind, image_velocity
 from .pairs_taichi import over_pairs, reader, vector_at, vector_into
-from .smoothing import drag_weight
+from .smoothing import drag_weight, pair_drag
 from .taichi_bridge import (
     Floats,
     Ints,
@@ -29,6 +29,7 @@ from .viscosity_warp import DIRECTION, EMPTIEST, Viscous
 
 ViscousT = struct_of(Viscous)
 weight = taichi_func(drag_weight)
+dragging = taichi_func(pair_drag, drag_weight)
 direction_at = reader(DIRECTION)
 
 
@@ -65,9 +66,8 @@ def seen_growing(box, extra: ti.template(), row, j, code):
 def pull_of(num, own, other, r, u):
     """What j does to i while they move apart at u, twice over."""
     s, r2 = vector_at(other, 9) * r, r.norm_sqr()
-    viscosity = 2.0 * own[7] * other[7] / ti.max(own[7] + other[7], 1.0e-30)
-    drag = 5.0 * viscosity / (own[8] * other[8] * ti.max(r2, 1.0e-6 * num.support * num.support))
-    return -near(num, other, r2) * drag * (r.dot(u) * r + s.dot(u) * s)
+    drag = other[3] * dragging(own[7], other[7], own[8], other[8], r2, num.support)
+    return -drag * (r.dot(u) * r + s.dot(u) * s)
 
 
 @ti.func

@@ -16,12 +16,13 @@ from .bind import warp_func
 from .conjugate_warp import KERNELS
 from .images import face_kind, image_velocity
 from .pairs import Pass, floats
-from .smoothing import drag_weight
+from .smoothing import drag_weight, pair_drag
 from .tool import Tool, felt
 
 wp.set_module_options({"enable_backward": False})
 
 weight = warp_func(drag_weight)
+dragging = warp_func(pair_drag, drag_weight)
 
 # Rows that neighbours are asked for: position, volume | direction, viscosity | root of the fullness, signs of s over r.
 DIRECTION = 12
@@ -81,9 +82,8 @@ def pull_of(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), 
     """What j does to i while they move apart at u, twice over."""
     s = wp.vec3(other[9] * r[0], other[10] * r[1], other[11] * r[2])
     r2 = wp.dot(r, r)
-    viscosity = 2.0 * own[7] * other[7] / wp.max(own[7] + other[7], 1.0e-30)
-    drag = 5.0 * viscosity / (own[8] * other[8] * wp.max(r2, 1.0e-6 * num.support * num.support))
-    return -(near(num, other, r2) * drag) * (wp.dot(r, u) * r + wp.dot(s, u) * s)
+    drag = other[3] * dragging(own[7], other[7], own[8], other[8], r2, num.support)
+    return -drag * (wp.dot(r, u) * r + wp.dot(s, u) * s)
 
 
 @wp.func

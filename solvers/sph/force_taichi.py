@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from fluidbench.native.scene import FRICTION
+from fluidbench.native.scene import FRICTION, STICK
 
 from ..corrected_taichi import mirrored_stress
 from ..neighbours_taichi import BoxT, ListsT, face_kind, image_traction, image_velocity
 from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, vector_at, vector_into
 from ..taichi_bridge import Floats, Forces, Ints, Phases, Quads, Vectors, force_at, phase_at, ti, vec3, vec4
+from ..viscosity_taichi import dragging
 from .force_warp import width_of
 from .particle_taichi import SmoothingT, slope
 
@@ -34,8 +35,8 @@ def rubbed(box, x, v, inward_pull, walls, h):
 
 def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> Any:
     """The kernel, see force_warp.py."""
-    width = width_of(strength, tensile, changing)
-    last, state_at = width - 4, reader(width)
+    width = width_of(strength, tensile, viscous, changing)
+    last, drags, state_at = width_of(strength, tensile, False, False), width - 4, reader(width)
 
     @ti.func
     def state_seen(box, extra: ti.template(), row, j, code):
@@ -47,19 +48,30 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
         return out
 
     @ti.func
+    def drag_along(num, own, begun, other, r, s):
+        """Acceleration by viscosity, along s."""
+        u, rest_volume, mu, theirs = vector_at(own, 4) - vector_at(other, 4), 0.0, begun[1], begun[1]
+        if ti.static(changing):
+            u -= (own[drags + 1] + other[drags + 1]) / 6.0 * r
+            mu, theirs = own[last + 2], other[last + 2]
+            rest_volume = other[3] / (own[last + 1] * other[last + 1])
+        else:
+            rest_volume = other[3] / begun[2] ** 2
+        between = dragging(mu, theirs, own[drags], other[drags], r.norm_sqr(), 2.0 * num.h)
+        return -rest_volume * between * s.dot(u) * s
+
+    @ti.func
     def force_pair(num, own, begun, other, r):
         u = vector_at(own, 4) - vector_at(other, 4)
         r2, ur, tiny = r.norm_sqr(), u.dot(r), 0.01 * num.h * num.h
         q = ti.sqrt(r2) / num.h
-        shock, drag = begun[0], begun[1]
+        shock = begun[0]
         mine, theirs = 1.0, 1.0
         if ti.static(changing):
             mine, theirs = 1.0 / other[last + 1], 1.0 / own[last + 1]
             # means of both partners, for both must find the same force
             fast = 0.5 * (own[last + 3] + other[last + 3])
             shock = num.artificial_viscosity * num.h * fast / ti.max(own[last], other[last])
-            thin = 2.0 * own[last + 2] * other[last + 2] / ti.max(own[last + 2] + other[last + 2], 1.0e-30)
-            drag = 10.0 * num.viscous_lattice * thin / (own[last + 1] * other[last + 1])
         along = 0.0  # what acts along the line of centres
         push = vec3(0.0)
         if ti.static(tensile):
@@ -71,22 +83,30 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
             along += ti.max(own[19], other[19]) * shock * ur / (r2 + tiny)
         else:
             along += shock * ti.min(ur, 0.0) / (r2 + tiny)
+        push = other[3] * slope(q, num.h) * (push + along * r)
         if ti.static(viscous):
-            along += drag * ur / (r2 + 0.01 * tiny)
-        f = other[3] * slope(q, num.h)
-        return vector_into(ti.Vector.zero(ti.f32, 6), 0, f * (push + along * r))
+            push += 2.0 * drag_along(num, own, begun, other, r, r)
+        return vector_into(ti.Vector.zero(ti.f32, 6), 0, push)
 
     @ti.func
-    def rough_apart(num, box, code, own, other, r, sums):
-        """What friction walls push along their normals stands by itself."""
+    def in_walls(num, box, code, own, begun, other, r, sums):
+        """Viscosity drags along both lines in no-slip walls; what friction walls push along their normals stands by
+        itself."""
         out = sums
+        if ti.static(viscous):
+            s = r
+            for axis in ti.static(range(3)):
+                if face_kind(box, code, axis) == STICK:
+                    s[axis] = -s[axis]
+            along = drag_along(num, own, begun, other, r, s) - drag_along(num, own, begun, other, r, r)
+            out = vector_into(out, 0, vector_at(out, 0) + along)
         for axis in ti.static(range(3)):
             if face_kind(box, code, axis) == FRICTION:
                 out[3 + axis] = out[axis]
                 out[axis] = 0.0
         return out
 
-    pushed_by = over_pairs(width, 6, force_pair, state_seen, rough_apart)
+    pushed_by = over_pairs(width, 6, force_pair, state_seen, in_walls)
 
     @ti.kernel
     def force(
@@ -111,10 +131,9 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
             if i - world * capacity < count[world]:
                 phase = phase_at(phases, world, phase_of[i])
                 own = state_at(state, i)
-                # Pi_ij per velocity difference: alpha h c / rho (Monaghan 1992), and 2 (d + 2) mu / (rho_i rho_j)
+                # Pi_ij per velocity difference: alpha h c / rho (Monaghan 1992)
                 shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
-                drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
-                begun = vec4(shock, drag, 0.0, 0.0)
+                begun = vec4(shock, phase.viscosity, phase.density, 0.0)
                 sums = pushed_by(num, box, lists, entries, number, state, density, i, own, begun)
                 a = vector_at(sums, 0) + force_at(forces, world, vector_at(own, 0))
                 rub = rubbed(box, vector_at(own, 0), vector_at(own, 4), a, vector_at(sums, 3), dt[world])

@@ -5,19 +5,21 @@ import warp as wp
 from fluidbench.native.scene import Box, Force, Phase, force_at
 
 from ..corrected import mirrored_stress
-from ..images import image_traction, image_velocity, rough_faces
+from ..images import image_traction, image_velocity, kinds_of_faces
 from ..pairs import Pass, floats
 from ..tool import Tool, felt
+from ..viscosity_warp import dragging
 from .particle import Smoothing, slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 
-def width_of(strength: bool, tensile: bool, changing: bool) -> int:
+def width_of(strength: bool, tensile: bool, viscous: bool, changing: bool) -> int:
     """Floats of a row of `force`: position, mass | velocity, then the pressure term; of what carries tension instead
     of that its stress (9), of what has strength also the traction that pulls back (3) and
-    how far it is a straggler. Where partners differ also density, rest density, viscosity, sound."""
-    return (20 if strength else 16 if tensile else 8) + (4 if changing else 0)
+    how far it is a straggler. Where partners differ also density, rest density, viscosity, sound; where viscosity is
+    explicit the root of the fullness and the growth, two of none."""
+    return (20 if strength else 16 if tensile else 8) + 4 * changing + 4 * viscous
 
 
 @wp.struct
@@ -34,21 +36,38 @@ class Forcing:
 
 
 def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, tooled: bool) -> Pass:
-    """Momentum: pressure or stress, artificial and Newtonian viscosity. Sums: what pushes (3), and what pushes across
-    friction walls (3), which never pull and rub by Coulomb's law."""
-    N = width = width_of(strength, tensile, changing)
-    LAST = width - 4
+    """Momentum: pressure or stress, artificial and Newtonian viscosity (that of viscosity.py, explicit). Sums: what
+    pushes (3), and what pushes across friction walls (3), which never pull and rub by Coulomb's law."""
+    N = width = width_of(strength, tensile, viscous, changing)
+    LAST = width_of(strength, tensile, False, False)
+    DRAGS = width - 4
     Own, Other, Sums = floats(width + 4), floats(width), floats(6)
 
     @wp.func
     def begin(num: Smoothing, data: Forcing, world: int, i: int):
-        """Coefficients of artificial and of Newtonian viscosity, where they do not depend on the partner."""
+        """The coefficient of artificial viscosity, Newtonian viscosity and rest density, where all are alike."""
         phase = data.phases[world, data.phase_of[i]]
         # At rest density: both partners must find the same force, and a cavitated liquid, whose density is low, would
-        # break the bound on dt. Monaghan 1992: alpha h c / rho; Monaghan & Gingold 1983: 2 (d + 2) mu / (rho_i rho_j)
+        # break the bound on dt. Monaghan 1992: alpha h c / rho
         shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
-        drag = 10.0 * num.viscous_lattice * phase.viscosity / (phase.density * phase.density)
-        return wp.vec4(shock, drag, 0.0, 0.0)
+        return wp.vec4(shock, phase.viscosity, phase.density, 0.0)
+
+    @wp.func
+    def drag_of(num: Smoothing, own: Own, other: Other, r: wp.vec3):
+        """Acceleration by a partner over -(r (r . u) + s (s . u)), see viscosity.py."""
+        if wp.static(changing):
+            drag = dragging(own[LAST + 2], other[LAST + 2], own[DRAGS], other[DRAGS], wp.dot(r, r), 2.0 * num.h)
+            return other[3] / (own[LAST + 1] * other[LAST + 1]) * drag
+        drag = dragging(own[N + 1], own[N + 1], own[DRAGS], other[DRAGS], wp.dot(r, r), 2.0 * num.h)
+        return other[3] / (own[N + 2] * own[N + 2]) * drag
+
+    @wp.func
+    def apart(own: Own, other: Other, r: wp.vec3):
+        """How fast two move apart beyond what growth moves them."""
+        u = wp.vec3(own[4] - other[4], own[5] - other[5], own[6] - other[6])
+        if wp.static(changing):
+            u -= (own[DRAGS + 1] + other[DRAGS + 1]) / 6.0 * r
+        return u
 
     @wp.func
     def seen(box: Box, data: Forcing, row: Other, j: int, code: int):
@@ -75,7 +94,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
         f = other[3] * slope(q, num.h)
         ur = wp.dot(u, r)
         tiny = 0.01 * num.h * num.h
-        shock, drag = float(own[N]), float(own[N + 1])
+        shock = float(own[N])
         mine, theirs = float(1.0), float(1.0)
         if wp.static(changing):
             # Stress over rho_i^2 rho0_j / rho0_i: light matter must not feel its heavy partner's mass, and the strain's
@@ -84,8 +103,6 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
             # both partners must find the same force: means of what differs between them
             fast = own[LAST + 3] + other[LAST + 3]
             shock = 0.5 * num.artificial_viscosity * num.h * fast / wp.max(own[LAST], other[LAST])
-            thin = 2.0 * own[LAST + 2] * other[LAST + 2] / wp.max(own[LAST + 2] + other[LAST + 2], 1.0e-30)
-            drag = 10.0 * num.viscous_lattice * thin / (own[LAST + 1] * other[LAST + 1])
         along = float(0.0)
         push = wp.vec3(0.0, 0.0, 0.0)
         if wp.static(tensile):
@@ -111,18 +128,26 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
         else:
             # artificial viscosity for approaching particles (Monaghan 1992)
             along += shock * wp.min(ur, 0.0) / (r2 + tiny)
-        if wp.static(viscous):
-            along += drag * ur / (r2 + 0.01 * tiny)
         push = f * (push + along * r)
+        if wp.static(viscous):
+            push -= 2.0 * drag_of(num, own, other, r) * wp.dot(r, apart(own, other, r)) * r
         sums = Sums()
         for a in range(3):
             sums[a] = push[a]
         return sums
 
     @wp.func
-    def across(num: Smoothing, rough: wp.vec3, own: Own, other: Other, r: wp.vec3, sums: Sums):
+    def across(num: Smoothing, kinds: wp.vec3, own: Own, other: Other, r: wp.vec3, sums: Sums):
+        if wp.static(viscous):
+            s = r
+            for a in range(3):
+                s[a] = wp.where(kinds[a] < 0.0, -r[a], r[a])
+            u = apart(own, other, r)
+            turned = drag_of(num, own, other, r) * (wp.dot(r, u) * r - wp.dot(s, u) * s)
+            for a in range(3):
+                sums[a] += turned[a]
         for a in range(3):
-            sums[3 + a] = rough[a] * sums[a]
+            sums[3 + a] = wp.max(kinds[a], 0.0) * sums[a]
             sums[a] = sums[a] - sums[3 + a]
         return sums
 
@@ -148,9 +173,9 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
                 rest = float(phase.density)
                 if wp.static(changing):
                     rest = own[LAST + 1]
-                drag = 10.0 * num.viscous_lattice * phase.viscosity / (rest * rest) * rho
+                drag = 10.0 * phase.viscosity / (rest * own[DRAGS] * own[DRAGS])
                 u = wp.vec3(own[4], own[5], own[6]) + h * (a + others) - found.velocity
-                still = wp.identity(n=3, dtype=float) - (h * drag) * found.drag
+                still = wp.identity(n=3, dtype=float) + (h * drag) * found.drag
                 a += (wp.inverse(still) * u - u) / h
         return a
 
@@ -177,4 +202,4 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
             a += by_tool(num, data, world, i, own, a + pull)
         data.acceleration[i] = a + pull
 
-    return Pass(Smoothing, Forcing, width, 6, pair, finish, begin, seen, rough_faces, across)
+    return Pass(Smoothing, Forcing, width, 6, pair, finish, begin, seen, kinds_of_faces, across)

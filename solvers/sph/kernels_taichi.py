@@ -34,7 +34,8 @@ from .strain_taichi import strain_pass
 def passes(strength: bool, tensile: bool, viscous: bool, changing: bool, settling: bool) -> SimpleNamespace:
     """All passes, for materials with or without shear stiffness, tension, viscosity, parameters or rest densities that
     differ between particles, and anything that settles."""
-    strain, force = strain_pass(strength, tensile, changing), force_pass(strength, tensile, viscous, changing)
+    variant = strength, tensile, viscous, changing
+    strain, force = strain_pass(*variant), force_pass(*variant)
     more = {"tell": tell_pass(tensile), "settle": settle_pass(tensile)} if settling else {}
     return SimpleNamespace(pack=pack, strain=strain, force=force, move=move, **more)
 

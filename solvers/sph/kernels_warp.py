@@ -37,7 +37,7 @@ def passes(
     name = "strength" if strength else "tensile" if tensile else "liquid"
     name += "_viscous" if viscous else "_inviscid"
     name += "_changing" * changing + "_tooled" * tooled
-    strain = strain_pass(strength, tensile, changing, tooled).compiled(f"strain_{name}", cpu)
+    strain = strain_pass(strength, tensile, viscous, changing, tooled).compiled(f"strain_{name}", cpu)
     force = force_pass(strength, tensile, viscous, changing, tooled).compiled(f"force_{name}", cpu)
     more = {"keep_out": keep_out} if tooled else {}
     if settling:

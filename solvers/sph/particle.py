@@ -25,6 +25,9 @@ PARTED = wp.constant(12.0)
 CLOSE = 0.9  # r0 of crowding.py: distance below which particles are moved apart, in spacings
 # Of h^2 crowd, at a time, for what carries tension: `farthest` at h = 1.5 d; pastes' 1.3 d ask for 0.06 (not tried).
 FARTHEST = wp.constant(0.2)
+# An edge's fullness (viscosity.py): with less around them few pairs stand for much, and explicit steps of threads would
+# be half as long as of all else. Implicit ones take half of this.
+THINNEST = wp.constant(0.25)
 
 slope = warp_func(wendland_slope)
 
@@ -37,7 +40,6 @@ class Smoothing:
     near: float  # kernel at the distance below which partners crowd each other [1/m^3]
     broken: float  # crowding by a single partner at which a lattice is broken [1/m]
     compact: float  # l^2: makes the shortest wave as stiff as between neighbours in a lattice [m^2]
-    viscous_lattice: float  # makes the viscosity of a shear flow on a lattice exact [-]
     lattice: float  # makes the second moment of a lattice exactly its density [-]
     density_diffusion: float  # delta [-]
     artificial_viscosity: float  # alpha [-]

@@ -44,7 +44,7 @@ def tell_pass(tensile: bool) -> Any:
         return sums
 
     @ti.func
-    def uncrowded(num, box, code, own, other, r, sums):
+    def uncrowded(num, box, code, own, begun, other, r, sums):
         """Walls crowd no liquid that cavitates."""
         out = sums
         if ti.static(not tensile):

@@ -1,6 +1,5 @@
 """Weakly compressible SPH: allocation and the order of passes."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -16,7 +15,7 @@ from ..conjugate import carried_by, effort_of, footprint_of
 from ..constitutive import STRETCHED
 from ..crowding import crowding, farthest, nearest
 from ..flow import plastic_strains
-from ..lattice import lattice_moments, opposing, sloping, viscous_scale
+from ..lattice import lattice_moment, opposing, sloping
 from ..neighbours import neighbours_of, side_by_side
 from ..readout import pressures, shear_stress
 from ..smoothing import wendland_slope
@@ -35,10 +34,9 @@ STRAINS = ("elastic_normal", "elastic_shear", "off_linear")
 BROKEN = 0.6  # distance below which what does not flow is moved apart, too: no elastic strain brings it there
 
 
-def weights(h: float, implicit: bool) -> Weights:
-    """Of what the passes sum over partners: grad W, and viscous drag by either scheme; h [m]."""
-    weights = Weights(lambda r: wendland_slope(r / h, h), **beside(2.0 * h))
-    return weights if implicit else replace(weights, drag=lambda r: wendland_slope(r / h, h) / (r * r))
+def weights(h: float) -> Weights:
+    """Of what the passes sum over partners: grad W, and viscous drag; h [m]."""
+    return Weights(lambda r: wendland_slope(r / h, h), **beside(2.0 * h))
 
 
 class SolverSPH(TraitsSPH):
@@ -51,7 +49,9 @@ class SolverSPH(TraitsSPH):
         self.scene, self.pool, self.config = scene, pool, config
         self.backend = backend_of(backend, scene, threads)
         self.implicit = scene.viscous and config.viscosity == "implicit"
-        self.width = width_of(scene.elastic, scene.tensile, scene.changes)
+        viscous = scene.viscous and not self.implicit
+        self.variant = scene.elastic, scene.tensile, viscous, scene.changes
+        self.width = width_of(*self.variant)
         self.settles = scene.flows and config.shifting > 0.0
         self.arranges = int(self.settles)
         self.kernels = self.kernels_of(backend)
@@ -60,7 +60,7 @@ class SolverSPH(TraitsSPH):
         self.num.h = ratio * scene.spacing
         self.num.near = nearest(CLOSE * scene.spacing, self.num.h)
         self.num.broken = crowding(BROKEN * scene.spacing, scene.spacing, CLOSE * scene.spacing, self.num.h)
-        self.num.lattice, self.num.viscous_lattice = 1.0 / lattice_moments(ratio)[0], viscous_scale(ratio)
+        self.num.lattice = 1.0 / lattice_moment(ratio)
         self.num.density_diffusion = config.density_diffusion
         self.num.artificial_viscosity = config.alpha(scene.scenario.material)
         self.num.compact = (scene.spacing / opposing(ratio)) ** 2
@@ -90,9 +90,7 @@ class SolverSPH(TraitsSPH):
             self.acceleration = wp.zeros(pool.size, dtype=wp.vec3)
             self.told = wp.zeros(pool.size * told_of(scene.tensile) // 4 if self.settles else 1, dtype=wp.vec4)
         self.neighbours = neighbours_of(scene, pool, self.backend, 2.0 * self.num.h, config.skin * self.num.h)
-        self.tool = (
-            None if scene.outline is None else tool_of(scene, 2.0 * self.num.h, weights(self.num.h, self.implicit))
-        )
+        self.tool = None if scene.outline is None else tool_of(scene, 2.0 * self.num.h, weights(self.num.h))
         self._bring_together()
         self.order = side_by_side(scene, pool)
         self.sort_bits = self.order.bits
@@ -105,9 +103,7 @@ class SolverSPH(TraitsSPH):
 
     def kernels_of(self, backend: str) -> SimpleNamespace:
         """The passes in a backend's language, compiled for this scene."""
-        scene = self.scene
-        viscous = scene.viscous and not self.implicit
-        variant = scene.elastic, scene.tensile, viscous, scene.changes, self.settles
+        scene, variant = self.scene, (*self.variant, self.settles)
         if backend == "taichi":
             from . import kernels_taichi
 

@@ -42,8 +42,9 @@ from ..taichi_bridge import (
     vec3,
     vec4,
 )
+from ..viscosity_taichi import weight
 from .force_warp import width_of
-from .particle import FARTHEST, LEVELLED
+from .particle import FARTHEST, LEVELLED, THINNEST
 from .particle_taichi import SmoothingT, crowded, damped, excess, slope
 from .strain_warp import CRUSHED, FLOOR, MATTER
 
@@ -57,10 +58,12 @@ def matter_seen(box, extra: ti.template(), row, j, code):
     return vector_into(moved, 8, image_gradient(box, vector_at(row, 8), code))
 
 
-def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
+def strain_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> Any:
     """The kernel, see strain_warp.py."""
-    width = width_of(strength, tensile, changing)
-    last, many = width - 4, 28 if strength else 22 if tensile else 3
+    width = width_of(strength, tensile, viscous, changing)
+    last, drags = width_of(strength, tensile, False, False), width - 4
+    full = 28 if strength else 22 if tensile else 3
+    many = full + viscous
     write_state = writer(width)
 
     @ti.func
@@ -83,10 +86,13 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
             sums = vector_into(sums, 19, excess(num, r) * w * r)
         else:
             sums[1], sums[2] = w * u.dot(r), -w * r.norm_sqr()
+        if ti.static(viscous):
+            near = weight(r.norm() / (2.0 * num.h), 2.0 * num.h)
+            sums[full] = other[3] / other[11] * near * r.norm_sqr() / 3.0
         return sums
 
     @ti.func
-    def strain_across(num, box, code, own, other, r, sums):
+    def strain_across(num, box, code, own, begun, other, r, sums):
         out = sums
         w = other[3] * slope(r.norm() / num.h, num.h)
         if ti.static(changing):
@@ -224,6 +230,10 @@ def strain_pass(strength: bool, tensile: bool, changing: bool) -> Any:
                 if ti.static(changing):
                     row = vector_into(row, last, vec3(rho, rest, phase.viscosity))
                     row[last + 3] = sound
+                if ti.static(viscous):
+                    row[drags] = ti.sqrt(ti.max(sums[full], THINNEST))
+                    if ti.static(changing):
+                        row[drags + 1] = growth[i]
                 write_state(state, i, row)
 
     return strain

@@ -27,8 +27,9 @@ from ..hourglass import off_linear
 from ..images import image_gradient, image_velocity, turned_back
 from ..pairs import Pass, floats
 from ..tool import Tool, felt, seen_by_tool
+from ..viscosity_warp import weight
 from .force_warp import width_of
-from .particle import FARTHEST, LEVELLED, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
+from .particle import FARTHEST, LEVELLED, THINNEST, Smoothing, broken, crowded, damped, pulled_back, slope, straggling
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -72,7 +73,7 @@ def seen_matter(box: Box, data: Any, row: floats(MATTER), j: int, code: int):
     return row
 
 
-def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> Pass:
+def strain_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, tooled: bool) -> Pass:
     """Continuity with density diffusion (Monaghan 2005, eq. 2.17; Antuono et al. 2010), then the material law.
 
     Diffusion must not level the gradient that carries pressure, which is `carried_gradient` from both partners: of what
@@ -80,14 +81,16 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
     corrected gradient of density itself (Antuono et al. 2010), and it levels no faster than `LEVELLED` times the shear
     and the growth that make its noise. Sums: diffusion; of what cavitates the inflow and the second moment's trace; of
     what carries tension the velocity gradient (9), the second moment (xx yy zz xy xz yz), the gradient of density (3)
-    and crowding (3), of what has strength also the motion off the mean of the neighbours (3) and the first moment (3).
+    and crowding (3), of what has strength also the motion off the mean of the neighbours (3) and the first moment (3);
+    where viscosity is explicit, last, fullness (viscosity.py).
 
     A plain sum takes it for expansion when a particle comes to the surface, out of a bore: tension pulled the skin of
     strands together by a fifth. A liquid that cavitates feels none, and needs no correction.
     """
-    sums_of = 28 if strength else 22 if tensile else 3
-    state_of = width_of(strength, tensile, changing) // 4
-    Own, Other, Sums = floats(MATTER + 4), floats(MATTER), floats(sums_of)
+    FULL = 28 if strength else 22 if tensile else 3
+    many = FULL + viscous
+    state_of, plain = (width_of(strength, tensile, *more) // 4 for more in ((viscous, changing), (False, False)))
+    Own, Other, Sums = floats(MATTER + 4), floats(MATTER), floats(many)
 
     @wp.func
     def pair(num: Smoothing, own: Own, other: Other, r: wp.vec3):
@@ -126,6 +129,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
             for a in range(3):
                 sums[22 + a] = w * u[a]
                 sums[25 + a] = m[a]
+        if wp.static(viscous):
+            sums[FULL] = other[3] / other[11] * weight(0.5 * wp.sqrt(r2) / num.h, 2.0 * num.h) * r2 / 3.0
         return sums
 
     @wp.func
@@ -166,6 +171,8 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
                 for a in range(3):
                     sums[22 + a] += u[a] * found.zeroth
                     sums[25 + a] += rho * found.first[a]
+            if wp.static(viscous):
+                sums[FULL] += found.full
         return sums
 
     @wp.func
@@ -278,6 +285,11 @@ def strain_pass(strength: bool, tensile: bool, changing: bool, tooled: bool) -> 
         else:
             store_vec4(data.state, at + 1, wp.vec4(own[4], own[5], own[6], scale * p))
         if wp.static(changing):
-            store_vec4(data.state, at + state_of - 1, wp.vec4(rho, rest, phase.viscosity, sound))
+            store_vec4(data.state, at + plain, wp.vec4(rho, rest, phase.viscosity, sound))
+        if wp.static(viscous):
+            growth = float(0.0)
+            if wp.static(changing):
+                growth = data.growth[i]
+            store_vec4(data.state, at + state_of - 1, wp.vec4(wp.sqrt(wp.max(sums[FULL], THINNEST)), growth, 0.0, 0.0))
 
-    return Pass(Smoothing, Straining, MATTER, sums_of, pair, finish, seen=seen_matter, faces=turned_back, across=across)
+    return Pass(Smoothing, Straining, MATTER, many, pair, finish, seen=seen_matter, faces=turned_back, across=across)
