@@ -6,6 +6,27 @@ import sys
 from pathlib import Path
 
 
+class Printed(io.TextIOWrapper):
+    """Standard output that remembers what kept it from printing: the error itself names no file, and what a stream of
+    Python cannot write it forgets."""
+
+    stuck: OSError | None = None
+
+    def write(self, text: str, /) -> int:
+        try:
+            return super().write(text)
+        except OSError as error:
+            self.stuck = error
+            raise
+
+    def flush(self) -> None:
+        try:
+            super().flush()
+        except OSError as error:
+            self.stuck = error
+            raise
+
+
 def ready() -> None:
     """Give a stream that is closed a place to go to or come from, and have characters replaced that standard output
     cannot show."""
@@ -14,16 +35,21 @@ def ready() -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")
+    out = sys.stdout
+    if isinstance(out, io.TextIOWrapper):
+        encoding, lines = out.encoding, out.line_buffering
+        sys.stdout = Printed(out.detach(), encoding, "replace", line_buffering=lines)
 
 
 def unprintable() -> str:
-    """Why standard output takes nothing more, and nothing where it does. What was not printed is thrown away then, or
+    """Why standard output took no more, and nothing where it took all. What was not printed is thrown away then, or
     Python would fail at it once more as it ends."""
     try:
         sys.stdout.flush()
-    except OSError as stuck:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return stuck.strerror or str(stuck)
-    return ""
+        stuck = sys.stdout.stuck if isinstance(sys.stdout, Printed) else None
+    except OSError as error:
+        stuck = error
+    if stuck is None:
+        return ""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return stuck.strerror or str(stuck)

@@ -1,6 +1,7 @@
 """The suite of cases itself: complete, planned as asked, judged by its rules."""
 
 import math
+import re
 
 import pytest
 
@@ -62,5 +63,9 @@ def test_plan_skips_with_a_reason_and_quick_leaves_out_the_dear():
 def test_mistakes_are_named():
     with pytest.raises(UserError, match="did you mean 'free_fall'"):
         select(["free_fal"])
-    with pytest.raises(UserError, match="rough, coarse, medium, fine"):
-        plan([cases()["free_fall"]], ["mpm"], ["finest"], False, HERE, None)
+    for level, says in (
+        ("finest", "no level 'finest'; did you mean 'fine'?"),
+        ("x", "known: coarse, fine, medium, rough"),
+    ):
+        with pytest.raises(UserError, match=re.escape(says)):
+            plan([cases()["free_fall"]], ["mpm"], [level], False, HERE, None)
