@@ -84,6 +84,9 @@ CASES = {
     "curing": tank(PASTE | {"cure": {"kind": "linear", "time": 0.1, "youngs_modulus": 1e5, "yield_stress": 500.0}}),
     "hardening": tank(PASTE | {"saturated_yield_stress": 500.0, "hardening": 5.0}),
     "growing": tank(PASTE | {"expansion": {"ratio": 3.0, "time": 0.1}}, pool=9000),
+    "viscous foam": tank(
+        PASTE | {"viscosity": 1.0, "flow_index": 1.0, "expansion": {"ratio": 3.0, "time": 0.1}}, CLOSED, pool=9000
+    ),
 }
 SEEDS = (1, 2)
 ALWAYS = {

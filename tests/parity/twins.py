@@ -35,16 +35,14 @@ TOLD = [*PLACE, (4, 5), (5, 8)]
 BY_WIDTH = {
     "told": {8: TOLD, 12: [*TOLD, (8, 11)]},
     "pushes": {12: [*PUSHES, (8, 9)], 16: [*PUSHES, (8, 14), (14, 15), (15, 16)]},
-    "state": {
-        16: [*PLACE, VELOCITY, (7, 16)],
-        20: [*PLACE, VELOCITY, (7, 16), *((k, k + 1) for k in range(16, 20))],
-        24: [*PLACE, VELOCITY, (7, 16), (16, 19), *((k, k + 1) for k in range(20, 24))],
-    },
 }
-CAVITATING = {  # what carries no tension
-    8: [*PLACE, VELOCITY, (7, 8)],
-    12: [*PLACE, VELOCITY, (7, 8), *((k, k + 1) for k in range(8, 12))],
-}
+
+
+def state_rows(strength: bool, tensile: bool, width: int) -> list[tuple[int, int]]:
+    """Of SPH's force: pressure or stress, what pulls back, and scalars up to the `width`."""
+    vectors = [(7, 16), (16, 19)] if strength else [(7, 16)] if tensile else []
+    scalars = 19 if strength else 16 if tensile else 7
+    return [*PLACE, VELOCITY, *vectors, *((k, k + 1) for k in range(scalars, width))]
 
 
 class Difference(AssertionError):
@@ -203,7 +201,7 @@ class Twins:
             if name in BY_CHANCE and by_chance:
                 continue
             a, b = self.ours[name].numpy(), self.theirs[name].numpy()
-            if self.method != "mpm" and (name in ROWS or name in BY_WIDTH):
+            if self.method != "mpm" and (name in ROWS or name in BY_WIDTH or name == "state"):
                 yield from self._rows(name, a, b)
             elif self.method == "mpm" and name in GRID:
                 yield from self._nodes(name, a, b)
@@ -242,8 +240,9 @@ class Twins:
         if len(a) < size:  # not used by this scene
             return
         a, b = a.reshape(size, -1), b.reshape(size, -1)
-        cavitates = name == "state" and not self.warp.scene.tensile
-        for first, last in ROWS.get(name) or (CAVITATING if cavitates else BY_WIDTH[name])[a.shape[1]]:
+        scene, width = self.warp.scene, a.shape[1]
+        state = state_rows(scene.elastic, scene.tensile, width)
+        for first, last in state if name == "state" else ROWS.get(name) or BY_WIDTH[name][width]:
             x, y = a[:, first:last], b[:, first:last]
             scale = max(float(np.abs(x).max()), self.least.get(f"{name}[{first}:{last}]", 1e-30))
             off = float(np.abs(x.astype(float) - y).max()) / scale
