@@ -2,12 +2,15 @@
 
 import math
 from functools import cache
+from itertools import combinations_with_replacement
 
 import numpy as np
 
 from fluidbench.method.timestep import damped_limit
 
 from .smoothing import drag_weight, wendland_slope
+
+WAVES = 16  # numbers of waves that are tried along an axis
 
 
 def lattice(support: float) -> np.ndarray:
@@ -39,33 +42,32 @@ def lattice_moment(ratio: float) -> float:
 @cache
 def stiffest_drag(support: float, thinnest: float) -> float:
     """The fastest rate [nu / d^2] at which pairs damp a wave (viscosity.py), `support` in spacings, with no fullness
-    below `thinnest`: in a lattice, or in sheets and threads of it, up to three thick, where each pair stands for
-    more."""
-    shapes = [(1, 1, 1), *((0, 1, 1), (0, 0, 1)) * 3]
-    return max(
-        _fastest(np.array(wide), layers, support, thinnest)
-        for wide, layers in zip(shapes, (1, 1, 1, 2, 2, 3, 3), strict=True)
-    )
+    below `thinnest`: in a lattice, or in sheets, threads and blocks cut from it, up to three spacings thick, where each
+    pair stands for more."""
+    sizes = combinations_with_replacement((0, 1, 2, 3), 3)
+    return max(drag_rate(size, support, thinnest) for size in sizes)
 
 
-def _fastest(wide: np.ndarray, layers: int, support: float, thinnest: float) -> float:
-    """The same of matter that goes on along the axes `wide`, and is so many spacings thick along the others."""
-    reach = int(support) + 1
-    ways, thick = (np.array(list(np.ndindex(*n)), float) for n in (2 * reach * wide + 1, np.where(wide, 1, layers)))
-    away = ways - reach * wide
+@cache
+def drag_rate(size: tuple[int, int, int], support: float, thinnest: float) -> float:
+    """The same of a lattice that is so many spacings thick along each axis; 0 where it goes on for ever."""
+    wide = np.array(size) == 0
+    around = 2 * (int(support) + 1) * wide
+    thick, ways = (np.array(list(np.ndindex(*n)), float) for n in (np.where(wide, 1, size), around + 1))
+    away = ways - around / 2
     r = thick[:, None, None] - thick[None, :, None] - away  # (own, other, cell, 3)
     r2 = (r * r).sum(axis=-1)
-    weight = np.vectorize(lambda q: drag_weight(q, support))(np.sqrt(r2) / support)
+    squares, which = np.unique(r2, return_inverse=True)
+    weight = np.array([drag_weight(math.sqrt(q) / support, support) for q in squares])[which].reshape(r2.shape)
     full = np.sqrt(np.maximum((weight * r2).sum(axis=(1, 2)) / 3.0, thinnest))
     weight *= 10.0 / (full[:, None, None] * full[None, :, None] * np.maximum(r2, 1.0))
     pulls = np.einsum("ijc,ijca,ijcb->ijcab", weight, r, r)
-    n, fastest = len(thick), 0.0
-    for wave in np.ndindex(*(6 * wide + 1)):
-        turn = np.exp(1j * away @ (np.pi / 6.0 * np.array(wave)))
-        matrix = -np.einsum("ijcab,c->iajb", pulls, turn)
-        matrix[range(n), :, range(n), :] += pulls.sum(axis=(1, 2))
-        fastest = max(fastest, float(np.linalg.eigvalsh(matrix.reshape(3 * n, 3 * n))[-1]))
-    return fastest
+    waves = np.array(list(np.ndindex(*((WAVES if wide.sum() < 3 else WAVES // 2) * wide + 1))), float)
+    turns = np.exp(1j * np.pi * (waves / np.maximum(waves.max(axis=0), 1.0)) @ away.T)
+    matrix = -np.einsum("ijcab,wc->wiajb", pulls, turns, optimize=True)
+    n = len(thick)
+    matrix[:, range(n), :, range(n), :] += pulls.sum(axis=(1, 2))[:, None]
+    return float(np.linalg.eigvalsh(matrix.reshape(len(waves), 3 * n, 3 * n)).max())
 
 
 @cache

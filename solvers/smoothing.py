@@ -27,12 +27,13 @@ def drag_weight(q: float, support: float):
     return 339.204 / s * t * t * t * sqrt(t) * q * q  # in this order 0 for what lies ever so far
 
 
-def pair_drag(viscosity: float, other: float, full: float, other_full: float, r2: float, support: float):
-    """What two of `viscosity` and `other` [Pa s] drag each other by, 5 mu w(r) / (f f' r^2) [Pa s/m^7], at a distance
-    whose square is r2 [m^2]; `full` are the roots of their fullness: see viscosity.py. mu is the harmonic mean."""
+def pair_drag(viscosity: float, other: float, full: float, other_full: float, r2: float, support: float, volume: float):
+    """What a particle of `volume` [m^3] and viscosity `other` drags one of `viscosity` [Pa s] by, V 5 mu w(r) /
+    (f f' r^2) [Pa s/m^4], at a distance whose square is r2 [m^2]; `full` are the roots of their fullness: see
+    viscosity.py. mu is the harmonic mean."""
     mean = 2.0 * viscosity * other / max(viscosity + other, 1.0e-30)
-    weight = drag_weight(sqrt(r2) / support, support)
-    return 5.0 * mean * weight / (full * other_full * max(r2, 1.0e-6 * support * support))
+    near = volume * drag_weight(sqrt(r2) / support, support)  # first: without it thick matter in small is no float32
+    return near * (5.0 * mean / (full * other_full * max(r2, 1.0e-6 * support * support)))
 
 
 def cusp(r: float, support: float):

@@ -35,9 +35,8 @@ def mpm_numbers(safety: float) -> tuple[float, float]:
     return acoustic, viscous
 
 
-def sph_numbers(ratio: float, cfl: float, viscous_number: float) -> tuple[float, float]:
-    """The same for a smoothing length of `ratio` spacings."""
+def sph_waves(ratio: float) -> float:
+    """The largest dt c / h of SPH with a smoothing length of `ratio` spacings."""
     rows = table("sph_stability_limits")
     rows = rows[rows["kernel"] == "wendland_c2"]
-    acoustic, viscous = (float(np.interp(ratio, rows["h_over_dx"], rows[key])) for key in ("C_h", "D_monaghan"))
-    return acoustic / cfl, viscous / viscous_number
+    return float(np.interp(ratio, rows["h_over_dx"], rows["C_h"]))

@@ -66,7 +66,7 @@ def seen_growing(box, extra: ti.template(), row, j, code):
 def pull_of(num, own, other, r, u):
     """What j does to i while they move apart at u, twice over."""
     s, r2 = vector_at(other, 9) * r, r.norm_sqr()
-    drag = other[3] * dragging(own[7], other[7], own[8], other[8], r2, num.support)
+    drag = dragging(own[7], other[7], own[8], other[8], r2, num.support, other[3])
     return -drag * (r.dot(u) * r + s.dot(u) * s)
 
 

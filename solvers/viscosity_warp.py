@@ -82,7 +82,7 @@ def pull_of(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), 
     """What j does to i while they move apart at u, twice over."""
     s = wp.vec3(other[9] * r[0], other[10] * r[1], other[11] * r[2])
     r2 = wp.dot(r, r)
-    drag = other[3] * dragging(own[7], other[7], own[8], other[8], r2, num.support)
+    drag = dragging(own[7], other[7], own[8], other[8], r2, num.support, other[3])
     return -drag * (wp.dot(r, u) * r + wp.dot(s, u) * s)
 
 

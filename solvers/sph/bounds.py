@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from fluidbench.method.timestep import Bound
 from fluidbench.scenario import Scenario
 
@@ -11,6 +13,16 @@ from .config import ConfigSPH
 from .particle import THINNEST
 
 HOURGLASS_SAFETY = 0.8  # for the stress and the pressure act on the same waves
+SHOCK_RATE = 18.0  # rate at which artificial viscosity, by Monaghan & Gingold's operator, damps a wave [nu / h^2]
+
+
+def damping(scenario: Scenario, ratio: float) -> float:
+    """The fastest rate [nu / h^2] at which explicit viscosity damps, where matter is thinnest. What grows and does not
+    split lies ever further apart within the same kernel."""
+    growth = scenario.material.expansion
+    most = growth.ratio if growth is not None and growth.kind == "growth" and not growth.split else 1.0
+    apart = [volume ** (1 / 3) for volume in np.geomspace(1.0, most, 9 if most > 1.0 else 1)]
+    return ratio * ratio * max(stiffest_drag(2.0 * ratio / d, THINNEST) / (d * d) for d in apart)
 
 
 def bounds_of(scenario: Scenario, config: ConfigSPH, speed: float) -> list[Bound]:
@@ -18,10 +30,10 @@ def bounds_of(scenario: Scenario, config: ConfigSPH, speed: float) -> list[Bound
     c, m = scenario.wave_speed, scenario.material
     ratio = config.smoothing(m)
     h = ratio * scenario.spacing
-    # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1). The bound is of
-    # its operator, whose fastest rate is 18 nu / h^2; that of the material is stiffer where matter is thin.
+    # Monaghan's artificial viscosity acts as nu = alpha h c / (2 (d + 2)) (Monaghan 2005, section 7.1). That of the
+    # material counts by how much faster it may damp.
     explicit = 0.0 if config.viscosity == "implicit" else m.viscosity
-    stiffer = ratio * ratio * stiffest_drag(2.0 * ratio, THINNEST) / 18.0
+    stiffer = damping(scenario, ratio) / SHOCK_RATE if explicit > 0.0 else 0.0
     nu = stiffer * explicit / m.density + config.alpha(m) * h * c / 10.0
     g = scenario.peak_acceleration
     a = config
@@ -33,7 +45,7 @@ def bounds_of(scenario: Scenario, config: ConfigSPH, speed: float) -> list[Bound
             "viscous",
             a.viscous_number * h * h / nu if nu > 0 else math.inf,
             f"{a.viscous_number:g} h^2 / nu, artificial viscosity and the stiffness of thin matter included",
-            "references.md, H: 0.111 h^2 / nu for the Monaghan-Gingold operator",
+            "references.md, H: 0.111 h^2 / nu for the Monaghan-Gingold operator; eigenvalues of thin lattices",
         ),
         Bound(
             "hourglass",

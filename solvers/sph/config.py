@@ -20,7 +20,9 @@ class ConfigSPH(Config):
         1.5, description="the same for those that expand, whose particles lie in no order"
     )
     cfl: Annotated[float, Field(gt=0, le=1.5)] = Field(0.4, description="acoustic number dt (c + v) / h")
-    viscous_number: Annotated[float, Field(gt=0, le=0.11)] = Field(0.09, description="dt nu / h^2; stable below 0.111")
+    viscous_number: Annotated[float, Field(gt=0, le=0.1)] = Field(
+        0.09, description="dt nu / h^2; stable below 0.111, in order"
+    )
     viscosity: Scheme = Field(
         "auto", description="Newtonian viscosity, explicit or implicit in time; auto takes the cheaper by the bounds"
     )

@@ -50,15 +50,14 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
     @ti.func
     def drag_along(num, own, begun, other, r, s):
         """Acceleration by viscosity, along s."""
-        u, rest_volume, mu, theirs = vector_at(own, 4) - vector_at(other, 4), 0.0, begun[1], begun[1]
+        u, mu, theirs = vector_at(own, 4) - vector_at(other, 4), begun[1], begun[1]
+        rest, their_rest = begun[2], begun[2]
         if ti.static(changing):
             u -= (own[drags + 1] + other[drags + 1]) / 6.0 * r
-            mu, theirs = own[last + 2], other[last + 2]
-            rest_volume = other[3] / (own[last + 1] * other[last + 1])
-        else:
-            rest_volume = other[3] / begun[2] ** 2
-        between = dragging(mu, theirs, own[drags], other[drags], r.norm_sqr(), 2.0 * num.h)
-        return -rest_volume * between * s.dot(u) * s
+            mu, theirs, rest, their_rest = own[last + 2], other[last + 2], own[last + 1], other[last + 1]
+        volume = other[3] / their_rest
+        between = dragging(mu, theirs, own[drags], other[drags], r.norm_sqr(), 2.0 * num.h, volume)
+        return -between / rest * s.dot(u) * s
 
     @ti.func
     def force_pair(num, own, begun, other, r):

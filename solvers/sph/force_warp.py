@@ -55,11 +55,11 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
     @wp.func
     def drag_of(num: Smoothing, own: Own, other: Other, r: wp.vec3):
         """Acceleration by a partner over -(r (r . u) + s (s . u)), see viscosity.py."""
+        mu, theirs, rest, their_rest = own[N + 1], own[N + 1], own[N + 2], own[N + 2]
         if wp.static(changing):
-            drag = dragging(own[LAST + 2], other[LAST + 2], own[DRAGS], other[DRAGS], wp.dot(r, r), 2.0 * num.h)
-            return other[3] / (own[LAST + 1] * other[LAST + 1]) * drag
-        drag = dragging(own[N + 1], own[N + 1], own[DRAGS], other[DRAGS], wp.dot(r, r), 2.0 * num.h)
-        return other[3] / (own[N + 2] * own[N + 2]) * drag
+            mu, theirs, rest, their_rest = own[LAST + 2], other[LAST + 2], own[LAST + 1], other[LAST + 1]
+        volume, r2 = other[3] / their_rest, wp.dot(r, r)
+        return dragging(mu, theirs, own[DRAGS], other[DRAGS], r2, 2.0 * num.h, volume) / rest
 
     @wp.func
     def apart(own: Own, other: Other, r: wp.vec3):

@@ -44,6 +44,7 @@ def test_kernels_compile(name, tmp_path):
         ("sph", (False, False, True, True, True, True)),
         ("sph", (False, True, True, False, True, True)),
         ("sph", (True, True, False, False, True, False)),
+        ("sph", (True, True, True, False, True, False)),
         ("sph", (True, True, True, True, True, True)),
         ("pbd", (False, False, False)),
         ("pbd", (False, True, True)),

@@ -14,6 +14,7 @@ from fluidbench.scenario.library import load
 from fluidbench.study import limits
 from fluidbench.study.limits import Limit, bisect, block, default_dt, lump
 from fluidbench.study.points import BLOCKS
+from solvers.lattice import drag_rate
 
 from ..conftest import bead, scenario
 
@@ -47,14 +48,14 @@ def test_theory_of_mpm_is_the_fourier_analysis_in_bulk():
 
 
 def test_theory_of_sph_is_the_fourier_analysis_at_its_smoothing_length():
-    """Between h / dx = 1.5 and 2 C_h goes from 1.729 to 1.725, D from 0.113 to 0.126; C_h is 1.753 at 1.3."""
+    """Between h / dx = 1.5 and 2 C_h goes from 1.729 to 1.725, at 1.3 it is 1.753. Drag damps 2 / dt at its limit."""
     solver, still = get_method("sph"), block(WATER, 0.01)
     config = solver.Config(**get_method("sph").bare)
     h = 0.018
     wave = (1.729 + 0.6 * (1.725 - 1.729)) * h / 10.0
     assert get_method("sph").theory(still, config) == pytest.approx(wave, rel=1e-9)
     thick = block({**WATER, "sound_speed": 0.05, "viscosity": 100.0}, 0.01)
-    slow, damp = wave * 10.0 / 0.05, (0.113 + 0.6 * 0.013) * h**2 / (1.0145237967860394 * 0.1)
+    slow, damp = wave * 10.0 / 0.05, 2.0 / drag_rate((0, 0, 0), 3.6, 0.25) * 0.01**2 / 0.1
     for settings in ({}, {"cfl": 0.2, "viscous_number": 0.05}):
         got = get_method("sph").theory(thick, solver.Config(**get_method("sph").bare, **settings))
         assert got == pytest.approx(damped(slow, damp), rel=1e-9)
