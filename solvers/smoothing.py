@@ -15,6 +15,13 @@ def wendland_slope(q: float, h: float):
     return -105.0 / (16.0 * pi * h * h * h * h * h) * t * t * t
 
 
+def drag_tail(q: float, support: float):
+    """drag_weight over q^2 [1/m^5]."""
+    t = max(1.0 - q, 0.0)
+    s = support * support * support * support * support
+    return 339.204 / s * t * t * t * sqrt(t)
+
+
 def drag_weight(q: float, support: float):
     """Weight w(r) [1/m^5] of viscous drag between two at r = q support: sum_j V_j w r_a r_b r_c r_d / r^2 is that of an
     isotropic tensor, 1/5 for xxzz, in the continuum and to 3.2 % in a cubic lattice, whatever the support from 2.4 to
@@ -22,18 +29,19 @@ def drag_weight(q: float, support: float):
     spacings, 22 % too much across.) q^2 (1 - q)^(7/2) comes nearest to it of all q^m (1 - q)^n with half-integer
     exponents; its factor is 3 / (4 pi B(7, 9/2)), with Euler's beta function.
     """
-    t = max(1.0 - q, 0.0)
-    s = support * support * support * support * support
-    return 339.204 / s * t * t * t * sqrt(t) * q * q  # in this order 0 for what lies ever so far
+    return drag_tail(q, support) * q * q  # in this order 0 for what lies ever so far
 
 
-def pair_drag(viscosity: float, other: float, full: float, other_full: float, r2: float, support: float, volume: float):
-    """What a particle of `volume` [m^3] and viscosity `other` drags one of `viscosity` [Pa s] by, V 5 mu w(r) /
-    (f f' r^2) [Pa s/m^4], at a distance whose square is r2 [m^2]; `full` are the roots of their fullness: see
-    viscosity.py. mu is the harmonic mean."""
-    mean = 2.0 * viscosity * other / max(viscosity + other, 1.0e-30)
-    near = volume * drag_weight(sqrt(r2) / support, support)  # first: without it thick matter in small is no float32
-    return near * (5.0 * mean / (full * other_full * max(r2, 1.0e-6 * support * support)))
+def shared_viscosity(one: float, other: float):
+    """Of two that differ: the harmonic mean [Pa s]."""
+    return 2.0 * one * other / max(one + other, 1.0e-30)
+
+
+def pair_drag(viscosity: float, r2: float, support: float, volume: float):
+    """What a particle of `volume` [m^3] within matter drags one by, 5 mu V w(r) / r^2 [Pa s/m^4], at a distance whose
+    square is r2 [m^2]: see viscosity.py."""
+    near = volume * drag_tail(sqrt(r2) / support, support)  # first: without V thick matter in small is no float32
+    return 5.0 * viscosity / (support * support) * near
 
 
 def cusp(r: float, support: float):

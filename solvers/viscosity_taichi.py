@@ -9,7 +9,7 @@ from fluidbench.native.scene import STICK
 from .conjugate_taichi import KERNELS
 from .neighbours_taichi import BoxT, ListsT, face_kind, image_velocity
 from .pairs_taichi import over_pairs, reader, vector_at, vector_into
-from .smoothing import drag_weight, pair_drag
+from .smoothing import drag_tail, drag_weight, pair_drag, shared_viscosity
 from .taichi_bridge import (
     Floats,
     Ints,
@@ -28,8 +28,8 @@ from .taichi_bridge import (
 from .viscosity_warp import DIRECTION, EMPTIEST, Viscous
 
 ViscousT = struct_of(Viscous)
-weight = taichi_func(drag_weight)
-dragging = taichi_func(pair_drag, drag_weight)
+weight = taichi_func(drag_weight, drag_tail)
+dragging, shared = taichi_func(pair_drag, drag_tail), taichi_func(shared_viscosity)
 direction_at = reader(DIRECTION)
 
 
@@ -65,8 +65,8 @@ def seen_growing(box, extra: ti.template(), row, j, code):
 @ti.func
 def pull_of(num, own, other, r, u):
     """What j does to i while they move apart at u, twice over."""
-    s, r2 = vector_at(other, 9) * r, r.norm_sqr()
-    drag = dragging(own[7], other[7], own[8], other[8], r2, num.support, other[3])
+    s = vector_at(other, 9) * r
+    drag = own[8] * other[8] * dragging(shared(own[7], other[7]), r.norm_sqr(), num.support, other[3])
     return -drag * (r.dot(u) * r + s.dot(u) * s)
 
 
@@ -107,7 +107,7 @@ def fullness(
         if i % capacity < count[i // capacity]:
             own = direction_at(rows, i)
             sums = fullness_over(num, box, lists, entries, number, rows, held, i, own, vec4(0.0))
-            written[3 * i + 2] = vec4(ti.sqrt(ti.max(sums[0], EMPTIEST)), 1.0, 1.0, 1.0)
+            written[3 * i + 2] = vec4(1.0 / ti.sqrt(ti.max(sums[0], EMPTIEST)), 1.0, 1.0, 1.0)
 
 
 @ti.kernel

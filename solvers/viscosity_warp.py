@@ -16,15 +16,17 @@ from .bind import warp_func
 from .conjugate_warp import KERNELS
 from .images import face_kind, image_velocity
 from .pairs import Pass, floats
-from .smoothing import drag_weight, pair_drag
+from .smoothing import drag_tail, drag_weight, pair_drag, shared_viscosity
 from .tool import Tool, felt
 
 wp.set_module_options({"enable_backward": False})
 
-weight = warp_func(drag_weight)
-dragging = warp_func(pair_drag, drag_weight)
+weight = warp_func(drag_weight, drag_tail)
+dragging = warp_func(pair_drag, drag_tail)
+shared = warp_func(shared_viscosity)
 
-# Rows that neighbours are asked for: position, volume | direction, viscosity | root of the fullness, signs of s over r.
+# Rows that neighbours are asked for: position, volume | direction, viscosity | one over the root
+# of the fullness, signs of s over r.
 DIRECTION = 12
 EMPTIEST = wp.constant(0.125)  # a corner's fullness: what has less around it is taken to have this
 vec1 = floats(1)
@@ -64,7 +66,7 @@ def fullness_pair(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECT
 
 @wp.func
 def fullness_finish(num: Viscous, box: Box, data: Applying, world: int, i: int, own: floats(DIRECTION + 4), sums: vec1):
-    store_vec4(data.rows, 3 * i + 2, wp.vec4(wp.sqrt(wp.max(sums[0], EMPTIEST)), 1.0, 1.0, 1.0))
+    store_vec4(data.rows, 3 * i + 2, wp.vec4(1.0 / wp.sqrt(wp.max(sums[0], EMPTIEST)), 1.0, 1.0, 1.0))
 
 
 @wp.func
@@ -81,8 +83,7 @@ def seen(box: Box, data: Applying, row: floats(DIRECTION), j: int, code: int):
 def pull_of(num: Viscous, own: floats(DIRECTION + 4), other: floats(DIRECTION), r: wp.vec3, u: wp.vec3):
     """What j does to i while they move apart at u, twice over."""
     s = wp.vec3(other[9] * r[0], other[10] * r[1], other[11] * r[2])
-    r2 = wp.dot(r, r)
-    drag = dragging(own[7], other[7], own[8], other[8], r2, num.support, other[3])
+    drag = own[8] * other[8] * dragging(shared(own[7], other[7]), wp.dot(r, r), num.support, other[3])
     return -drag * (wp.dot(r, u) * r + wp.dot(s, u) * s)
 
 
@@ -100,11 +101,11 @@ def finish(num: Viscous, box: Box, data: Applying, world: int, i: int, own: floa
 
 
 @wp.func
-def dragged(data: Applying, world: int, i: int, x: wp.vec3, viscosity: float, fullness: float, v: wp.vec3):
+def dragged(data: Applying, world: int, i: int, x: wp.vec3, viscosity: float, thin: float, v: wp.vec3):
     """What a rigid body takes from a velocity relative to it, in a step (tool_map.py)."""
     found = felt(data.tool, x)
     rest = rest_density(data.mass, data.volume, i)
-    return (10.0 * data.dt[world] * viscosity / (rest * fullness * fullness)) * (found.drag * v)
+    return (10.0 * data.dt[world] * viscosity * thin * thin / rest) * (found.drag * v)
 
 
 @wp.func
@@ -112,7 +113,7 @@ def tooled_fullness_finish(
     num: Viscous, box: Box, data: Applying, world: int, i: int, own: floats(DIRECTION + 4), sums: vec1
 ):
     total = sums[0] + felt(data.tool, wp.vec3(own[0], own[1], own[2])).full
-    store_vec4(data.rows, 3 * i + 2, wp.vec4(wp.sqrt(wp.max(total, EMPTIEST)), 1.0, 1.0, 1.0))
+    store_vec4(data.rows, 3 * i + 2, wp.vec4(1.0 / wp.sqrt(wp.max(total, EMPTIEST)), 1.0, 1.0, 1.0))
 
 
 @wp.func
@@ -143,9 +144,9 @@ def take_along(
     if i - world * capacity < count[world] and data.held[i] == FREE:
         row = load_vec4(data.rows, 3 * i)
         viscosity = load_vec4(data.rows, 3 * i + 1)[3]
-        fullness = load_vec4(data.rows, 3 * i + 2)[0]
+        thin = load_vec4(data.rows, 3 * i + 2)[0]
         x = wp.vec3(row[0], row[1], row[2])
-        driven[i] = dragged(data, world, i, x, viscosity, fullness, data.tool.pose.velocity[0])
+        driven[i] = dragged(data, world, i, x, viscosity, thin, data.tool.pose.velocity[0])
         aim[i] = aim[i] + driven[i]
 
 

@@ -17,7 +17,7 @@ from ..flow_taichi import pressure, strained
 from ..hourglass_taichi import off_linear_after
 from ..neighbours_taichi import BoxT, ListsT, image_traction, image_velocity
 from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, symmetric_at, vector_at, vector_into, writer
-from ..smoothing import drag_weight
+from ..smoothing import drag_tail, drag_weight
 from ..taichi_bridge import (
     Floats,
     Ints,
@@ -36,7 +36,7 @@ from ..taichi_bridge import (
 from .numbers import MOVING, PULLING
 from .surroundings_taichi import NumbersT, density_around, fabric_around, levels, moving_of, sloping
 
-weight = taichi_func(drag_weight)
+weight = taichi_func(drag_weight, drag_tail)
 pulling_of = reader(PULLING)
 write_pulling = writer(PULLING)
 

@@ -34,14 +34,14 @@ from ..flow import pressure, strained
 from ..hourglass import off_linear
 from ..images import image_traction, image_velocity
 from ..pairs import Pass, floats
-from ..smoothing import drag_weight
+from ..smoothing import drag_tail, drag_weight
 from ..tool import Tool, felt, seen_by_tool
 from .numbers import MOVING, PULLING, Numbers
 from .surroundings_warp import keep, levels, sloping, surrounded
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-weight = warp_func(drag_weight)
+weight = warp_func(drag_weight, drag_tail)
 vec24 = floats(24)
 
 

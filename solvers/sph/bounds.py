@@ -21,7 +21,7 @@ def damping(scenario: Scenario, ratio: float) -> float:
     split lies ever further apart within the same kernel."""
     growth = scenario.material.expansion
     most = growth.ratio if growth is not None and growth.kind == "growth" and not growth.split else 1.0
-    apart = [volume ** (1 / 3) for volume in np.geomspace(1.0, most, 9 if most > 1.0 else 1)]
+    apart = [float(volume) ** (1 / 3) for volume in np.geomspace(1.0, most, 9 if most > 1.0 else 1)]
     return ratio * ratio * max(stiffest_drag(2.0 * ratio / d, THINNEST) / (d * d) for d in apart)
 
 

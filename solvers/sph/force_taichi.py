@@ -8,7 +8,7 @@ from ..corrected_taichi import mirrored_stress
 from ..neighbours_taichi import BoxT, ListsT, face_kind, image_traction, image_velocity
 from ..pairs_taichi import matrix_into, over_pairs, reader, stressed, vector_at, vector_into
 from ..taichi_bridge import Floats, Forces, Ints, Phases, Quads, Vectors, force_at, phase_at, ti, vec3, vec4
-from ..viscosity_taichi import dragging
+from ..viscosity_taichi import dragging, shared
 from .force_warp import width_of
 from .particle_taichi import SmoothingT, slope
 
@@ -50,14 +50,14 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
     @ti.func
     def drag_along(num, own, begun, other, r, s):
         """Acceleration by viscosity, along s."""
-        u, mu, theirs = vector_at(own, 4) - vector_at(other, 4), begun[1], begun[1]
-        rest, their_rest = begun[2], begun[2]
+        u, mu = vector_at(own, 4) - vector_at(other, 4), begun[1]
+        volume, per_rest = other[3] * begun[2], begun[2]
         if ti.static(changing):
             u -= (own[drags + 1] + other[drags + 1]) / 6.0 * r
-            mu, theirs, rest, their_rest = own[last + 2], other[last + 2], own[last + 1], other[last + 1]
-        volume = other[3] / their_rest
-        between = dragging(mu, theirs, own[drags], other[drags], r.norm_sqr(), 2.0 * num.h, volume)
-        return -between / rest * s.dot(u) * s
+            mu = shared(own[last + 2], other[last + 2])
+            volume, per_rest = other[3] / other[last + 1], 1.0 / own[last + 1]
+        between = own[drags] * other[drags] * dragging(mu, r.norm_sqr(), 2.0 * num.h, volume)
+        return -between * per_rest * s.dot(u) * s
 
     @ti.func
     def force_pair(num, own, begun, other, r):
@@ -132,7 +132,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) -> 
                 own = state_at(state, i)
                 # Pi_ij per velocity difference: alpha h c / rho (Monaghan 1992)
                 shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
-                begun = vec4(shock, phase.viscosity, phase.density, 0.0)
+                begun = vec4(shock, phase.viscosity, 1.0 / phase.density, 0.0)
                 sums = pushed_by(num, box, lists, entries, number, state, density, i, own, begun)
                 a = vector_at(sums, 0) + force_at(forces, world, vector_at(own, 0))
                 rub = rubbed(box, vector_at(own, 0), vector_at(own, 4), a, vector_at(sums, 3), dt[world])

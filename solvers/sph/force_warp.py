@@ -8,7 +8,7 @@ from ..corrected import mirrored_stress
 from ..images import image_traction, image_velocity, kinds_of_faces
 from ..pairs import Pass, floats
 from ..tool import Tool, felt
-from ..viscosity_warp import dragging
+from ..viscosity_warp import dragging, shared
 from .particle import Smoothing, slope
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -18,7 +18,7 @@ def width_of(strength: bool, tensile: bool, viscous: bool, changing: bool) -> in
     """Floats of a row of `force`: position, mass | velocity, then the pressure term; of what carries tension instead
     of that its stress (9), of what has strength also the traction that pulls back (3) and
     how far it is a straggler. Where partners differ also density, rest density, viscosity, sound; where viscosity is
-    explicit the root of the fullness and the growth, two of none."""
+    explicit one over the root of the fullness and the growth, two of none."""
     return (20 if strength else 16 if tensile else 8) + 4 * changing + 4 * viscous
 
 
@@ -45,21 +45,21 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
 
     @wp.func
     def begin(num: Smoothing, data: Forcing, world: int, i: int):
-        """The coefficient of artificial viscosity, Newtonian viscosity and rest density, where all are alike."""
+        """The coefficient of artificial viscosity, Newtonian viscosity and volume at rest, where all are alike."""
         phase = data.phases[world, data.phase_of[i]]
         # At rest density: both partners must find the same force, and a cavitated liquid, whose density is low, would
         # break the bound on dt. Monaghan 1992: alpha h c / rho
         shock = num.artificial_viscosity * num.h * phase.wave_speed / phase.density
-        return wp.vec4(shock, phase.viscosity, phase.density, 0.0)
+        return wp.vec4(shock, phase.viscosity, 1.0 / phase.density, 0.0)
 
     @wp.func
     def drag_of(num: Smoothing, own: Own, other: Other, r: wp.vec3):
         """Acceleration by a partner over -(r (r . u) + s (s . u)), see viscosity.py."""
-        mu, theirs, rest, their_rest = own[N + 1], own[N + 1], own[N + 2], own[N + 2]
+        mu, volume, per_rest = own[N + 1], other[3] * own[N + 2], own[N + 2]
         if wp.static(changing):
-            mu, theirs, rest, their_rest = own[LAST + 2], other[LAST + 2], own[LAST + 1], other[LAST + 1]
-        volume, r2 = other[3] / their_rest, wp.dot(r, r)
-        return dragging(mu, theirs, own[DRAGS], other[DRAGS], r2, 2.0 * num.h, volume) / rest
+            mu = shared(own[LAST + 2], other[LAST + 2])
+            volume, per_rest = other[3] / other[LAST + 1], 1.0 / own[LAST + 1]
+        return own[DRAGS] * other[DRAGS] * per_rest * dragging(mu, wp.dot(r, r), 2.0 * num.h, volume)
 
     @wp.func
     def apart(own: Own, other: Other, r: wp.vec3):
@@ -173,7 +173,7 @@ def force_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, too
                 rest = float(phase.density)
                 if wp.static(changing):
                     rest = own[LAST + 1]
-                drag = 10.0 * phase.viscosity / (rest * own[DRAGS] * own[DRAGS])
+                drag = 10.0 * phase.viscosity * own[DRAGS] * own[DRAGS] / rest
                 u = wp.vec3(own[4], own[5], own[6]) + h * (a + others) - found.velocity
                 still = wp.identity(n=3, dtype=float) + (h * drag) * found.drag
                 a += (wp.inverse(still) * u - u) / h

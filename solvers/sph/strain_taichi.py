@@ -231,7 +231,7 @@ def strain_pass(strength: bool, tensile: bool, viscous: bool, changing: bool) ->
                     row = vector_into(row, last, vec3(rho, rest, phase.viscosity))
                     row[last + 3] = sound
                 if ti.static(viscous):
-                    row[drags] = ti.sqrt(ti.max(sums[full], THINNEST))
+                    row[drags] = 1.0 / ti.sqrt(ti.max(sums[full], THINNEST))
                     if ti.static(changing):
                         row[drags + 1] = growth[i]
                 write_state(state, i, row)

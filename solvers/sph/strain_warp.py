@@ -290,6 +290,8 @@ def strain_pass(strength: bool, tensile: bool, viscous: bool, changing: bool, to
             growth = float(0.0)
             if wp.static(changing):
                 growth = data.growth[i]
-            store_vec4(data.state, at + state_of - 1, wp.vec4(wp.sqrt(wp.max(sums[FULL], THINNEST)), growth, 0.0, 0.0))
+            store_vec4(
+                data.state, at + state_of - 1, wp.vec4(1.0 / wp.sqrt(wp.max(sums[FULL], THINNEST)), growth, 0.0, 0.0)
+            )
 
     return Pass(Smoothing, Straining, MATTER, many, pair, finish, seen=seen_matter, faces=turned_back, across=across)

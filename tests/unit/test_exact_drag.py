@@ -10,7 +10,7 @@ from fluidbench.native.simulation import Simulation
 from fluidbench.registry import get_method
 from fluidbench.scenario.library import define
 from solvers.lattice import drag_rate, stiffest_drag
-from solvers.smoothing import drag_weight, pair_drag
+from solvers.smoothing import drag_weight, pair_drag, shared_viscosity
 from solvers.sph.bounds import damping
 
 PERIODIC = {f"{axis}_{end}": "periodic" for axis in "xyz" for end in ("lower", "upper")}
@@ -139,9 +139,9 @@ def test_what_grows_without_splitting_is_damped_as_it_lies_apart():
 
 def test_drag_of_a_pair_by_hand():
     w = drag_weight(0.5, 2.0)
-    assert pair_drag(3.0, 3.0, 1.0, 1.0, 1.0, 2.0, 0.1) == pytest.approx(0.1 * 5.0 * 3.0 * w)
-    assert pair_drag(3.0, 1.0, 0.5, 0.8, 1.0, 2.0, 1.0) == pytest.approx(5.0 * 1.5 * w / 0.4)
-    assert pair_drag(3.0, 0.0, 1.0, 1.0, 1.0, 2.0, 1.0) == 0.0 == pair_drag(3.0, 3.0, 1.0, 1.0, 1e18, 2.0, 1.0)
+    assert pair_drag(3.0, 1.0, 2.0, 0.1) == pytest.approx(0.1 * 5.0 * 3.0 * w)
+    assert pair_drag(3.0, 1e18, 2.0, 1.0) == 0.0 < pair_drag(3.0, 0.0, 2.0, 1.0)
+    assert shared_viscosity(3.0, 1.0) == 1.5 and shared_viscosity(3.0, 0.0) == shared_viscosity(0.0, 0.0) == 0.0
 
 
 @pytest.mark.parametrize(("spacing", "viscosity"), [(1e-5, 1e5), (1e-6, 0.1)])
