@@ -36,9 +36,9 @@ def ready() -> None:
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     out = sys.stdout
-    if isinstance(out, io.TextIOWrapper):
-        encoding, lines = out.encoding, out.line_buffering
-        sys.stdout = Printed(out.detach(), encoding, "replace", line_buffering=lines)
+    if type(out) is io.TextIOWrapper:
+        encoding, lines, through = out.encoding, out.line_buffering, out.write_through
+        sys.stdout = Printed(out.detach(), encoding, "replace", line_buffering=lines, write_through=through)
 
 
 def unprintable() -> str:

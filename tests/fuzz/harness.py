@@ -79,13 +79,21 @@ class Outcome:
         return self.ran or self.code == 0
 
 
+class Kept(io.BytesIO):
+    """What was printed, whatever becomes of the stream that it went through."""
+
+    def close(self) -> None:
+        pass
+
+
 def fluidbench(arguments: Iterable[str], limit: int = 60) -> Outcome:
     """`fluidbench ARGUMENTS` in this process and folder."""
     from fluidbench.cli import main
 
     done = Outcome()
-    out = io.TextIOWrapper(io.BytesIO(), "utf-8", "strict", write_through=True)
-    err = io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True)  # as Python opens them
+    printed, complained = Kept(), Kept()
+    out = io.TextIOWrapper(printed, "utf-8", "strict", write_through=True)
+    err = io.TextIOWrapper(complained, "utf-8", "backslashreplace", write_through=True)  # as Python opens them
     with (
         patch.object(sys, "argv", ["fluidbench", *arguments]),
         contextlib.redirect_stdout(out),
@@ -109,7 +117,7 @@ def fluidbench(arguments: Iterable[str], limit: int = 60) -> Outcome:
             last = traceback.extract_tb(error.__traceback__)[-1]
             text = str(error)[:160]
             done.crash = f"{type(error).__name__}: {text} ({Path(last.filename).name}:{last.lineno})"
-    done.out, done.err = (s.buffer.getvalue().decode("utf-8", "replace") for s in (out, err))
+    done.out, done.err = (s.getvalue().decode("utf-8", "replace") for s in (printed, complained))
     return done
 
 

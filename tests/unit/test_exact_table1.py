@@ -6,6 +6,7 @@ from fluidbench.paper import judged as module
 from fluidbench.paper.definitions import CONFIRMED, METHODS, OPEN, REFUTED
 from fluidbench.paper.evidence import SHIPPED
 from fluidbench.paper.judged import best_for, bound_dt, cells, cost, equal_cost, fidelity, limits, stability
+from solvers.lattice import stiffest_drag
 
 from .made import BEAD, case, evidence, finished, known, repeated, trial
 
@@ -216,7 +217,7 @@ def test_a_step_collapses_when_it_shrinks_tenfold(monkeypatch):
 def test_a_bound_is_the_least_of_the_varied_scenario():
     """A thousand Pa s in paste of 6 kPa: the viscous limit of SPH, with nu = 1 m^2/s and a little of its own."""
     h, c = 1.3 * BEAD.spacing, BEAD.wave_speed
-    wanted = 0.09 * h**2 / (1.0729193 + 1.0 * h * c / 10.0)
+    wanted = 0.09 * h**2 / (1.3**2 * stiffest_drag(2.6, 0.25) / 18.0 + 1.0 * h * c / 10.0)
     thick = {"material.viscosity": 1e3, "numerics.sph.viscosity": "explicit"}
     assert bound_dt(BEAD, "sph", thick) == pytest.approx(wanted)
     assert bound_dt(BEAD, "sph", thick | {"numerics.sph.viscous_number": 0.045}) == pytest.approx(wanted / 2)
