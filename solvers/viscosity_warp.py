@@ -25,8 +25,8 @@ weight = warp_func(drag_weight, drag_tail)
 dragging = warp_func(pair_drag, drag_tail)
 shared = warp_func(shared_viscosity)
 
-# Rows that neighbours are asked for: position, volume | direction, viscosity | one over the root
-# of the fullness, signs of s over r.
+# Rows that neighbours are asked for: position, volume | direction, viscosity | one over the root of the
+# fullness, signs of s over r.
 DIRECTION = 12
 EMPTIEST = wp.constant(0.125)  # a corner's fullness: what has less around it is taken to have this
 vec1 = floats(1)
